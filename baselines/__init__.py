@@ -1,0 +1,1 @@
+"""Motion cueing algorithms that need no training."""

@@ -1,0 +1,225 @@
+"""The motion of a car as its driver should feel it: cue traces, and their CSV form."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import DataError
+from .storage import write_text
+
+Floats = NDArray[np.float64]
+
+GRAVITY: Final = 9.81
+"""Acceleration due to gravity, m/s^2, along +z (down)."""
+
+CSV_COLUMNS: Final = (
+    "time_s",
+    "specific_force_x_m_s2",
+    "specific_force_y_m_s2",
+    "specific_force_z_m_s2",
+    "angular_velocity_x_rad_s",
+    "angular_velocity_y_rad_s",
+    "angular_velocity_z_rad_s",
+)
+"""Columns every cue CSV has; further numeric columns become channels."""
+
+_TIME_TOLERANCE: Final = 1e-3
+"""Largest deviation of a time step from the mean step, relative."""
+
+
+@dataclass(frozen=True, eq=False)
+class CueTrace:
+    """Specific force and angular velocity of a car over time, at its cab's reference point (F_A).
+
+    Any arrays can fill it; they are copied, checked and made read-only.
+
+    Args:
+        name: What the drive is called in tables and file names.
+        time: (n,) seconds, strictly increasing in equal steps.
+        specific_force: (n, 3) f = a - g in F_A (x forward, y right, z down), m/s^2.
+        angular_velocity: (n, 3) of the car's body in F_A, rad/s.
+        angular_acceleration: (n, 3) rad/s^2; central differences of the angular velocity if not given.
+        channels: Further signals of the car, each (n,), such as ``speed_m_s``; never seen by a policy.
+        source: Where the trace comes from, for reports.
+
+    Raises:
+        DataError: a shape is wrong, a value is not finite, or time does not advance in equal steps.
+    """
+
+    name: str
+    time: Floats
+    specific_force: Floats
+    angular_velocity: Floats
+    angular_acceleration: Floats = None  # type: ignore[assignment]  # filled below
+    channels: Mapping[str, Floats] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        time = _checked(self.name, "time", self.time, (None,))
+        n = len(time)
+        if n < 2:
+            raise DataError(f"{self.name}: time has {n} samples; a trace needs at least 2")
+        _check_steps(self.name, time)
+        object.__setattr__(self, "time", time)
+        for label in ("specific_force", "angular_velocity"):
+            object.__setattr__(self, label, _checked(self.name, label, getattr(self, label), (n, 3)))
+        acceleration: Any = self.angular_acceleration
+        if acceleration is None:
+            acceleration = np.gradient(self.angular_velocity, self.dt, axis=0)
+        acceleration = _checked(self.name, "angular_acceleration", acceleration, (n, 3))
+        object.__setattr__(self, "angular_acceleration", acceleration)
+        channels = {key: _checked(self.name, key, value, (n,)) for key, value in self.channels.items()}
+        object.__setattr__(self, "channels", channels)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def dt(self) -> float:
+        """Time step, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last, s."""
+        return float(self.time[-1] - self.time[0])
+
+    def at_point(self, offset: ArrayLike) -> Floats:
+        """Specific force (n, 3) at a point fixed to the car, ``offset`` (3,) in metres from F_A's origin.
+
+        f_P = f_A + (Omegadot + Omega Omega) OP, the rigid-body part of Eq. (37).
+        """
+        arm = np.broadcast_to(_checked(self.name, "offset", offset, (3,)), (len(self), 3))
+        omega = self.angular_velocity
+        tangential = np.cross(self.angular_acceleration, arm)
+        return np.asarray(self.specific_force + tangential + np.cross(omega, np.cross(omega, arm)))
+
+    def resampled(self, dt: float) -> CueTrace:
+        """The trace at another time step, by linear interpolation between samples.
+
+        A trace that already has this step is returned as it is.
+        """
+        if not dt > 0.0:
+            raise DataError(f"{self.name}: time step must be positive, found {dt}")
+        if abs(self.dt - dt) <= 1e-9 * dt:
+            return self
+        time = self.time[0] + dt * np.arange(int(np.floor(self.duration / dt + 1e-9)) + 1)
+
+        def at(values: Floats) -> Floats:
+            columns = [np.interp(time, self.time, column) for column in np.atleast_2d(values.T)]
+            return np.asarray(columns[0] if values.ndim == 1 else np.stack(columns, axis=1))
+
+        return replace(
+            self,
+            time=time,
+            specific_force=at(self.specific_force),
+            angular_velocity=at(self.angular_velocity),
+            angular_acceleration=at(self.angular_acceleration),
+            channels={key: at(value) for key, value in self.channels.items()},
+        )
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the trace as CSV: :data:`CSV_COLUMNS`, then the channels, one row a sample."""
+        body = np.column_stack(
+            [self.time, self.specific_force, self.angular_velocity, *(self.channels[k] for k in self.channels)]
+        )
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow([*CSV_COLUMNS, *self.channels])
+        writer.writerows([[f"{value:.9g}" for value in row] for row in body])
+        write_text(path, buffer.getvalue())
+
+    @classmethod
+    def from_csv(cls, path: str | Path, name: str | None = None) -> CueTrace:
+        """Read a trace written by :meth:`to_csv`, or any CSV with :data:`CSV_COLUMNS`.
+
+        Raises:
+            DataError: the file is empty, a column is missing, or a value is not a finite number.
+        """
+        table = read_table(path)
+        missing = [column for column in CSV_COLUMNS if column not in table]
+        if missing:
+            raise DataError(
+                f"{path}: missing column {', '.join(missing)}; found {', '.join(table)}. "
+                "`motion-cueing import` converts a log with other columns"
+            )
+        return cls(
+            name=name or Path(path).stem,
+            time=table[CSV_COLUMNS[0]],
+            specific_force=np.stack([table[column] for column in CSV_COLUMNS[1:4]], axis=1),
+            angular_velocity=np.stack([table[column] for column in CSV_COLUMNS[4:7]], axis=1),
+            channels={key: value for key, value in table.items() if key not in CSV_COLUMNS},
+            source=str(path),
+        )
+
+
+def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, Floats]:
+    """Numeric columns of a CSV file with a header row, by name; all of them, or those named.
+
+    Empty cells become NaN.
+
+    Raises:
+        DataError: the file cannot be read, is empty, has ragged rows or a cell that is no number.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: cannot be read ({error})") from None
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    if len(rows) < 2:
+        raise DataError(f"{path}: empty; expected a header row and data rows")
+    header = [cell.strip() for cell in rows[0]]
+    repeated = {name for name in header if header.count(name) > 1}
+    if repeated:
+        raise DataError(f"{path}: column {', '.join(sorted(repeated))} occurs more than once")
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            raise DataError(f"{path}: row {number} has {len(row)} cells, the header has {len(header)}")
+    wanted = header if columns is None else columns
+    missing = [name for name in wanted if name not in header]
+    if missing:
+        raise DataError(f"{path}: missing column {', '.join(missing)}; found {', '.join(header)}")
+    return {name: _numbers(path, name, [row[header.index(name)] for row in rows[1:]]) for name in wanted}
+
+
+def _numbers(path: str | Path, name: str, cells: list[str]) -> Floats:
+    try:
+        return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+    except ValueError as error:
+        raise DataError(f"{path}: column {name}: {error}") from None
+
+
+def _checked(trace: str, label: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError(f"{trace}: {label} is not an array of numbers") from None
+    if len(array.shape) != len(shape) or any(w not in (None, h) for w, h in zip(shape, array.shape, strict=True)):
+        wanted = "(" + ", ".join("n" if w is None else str(w) for w in shape) + ")"
+        raise DataError(f"{trace}: {label} has shape {array.shape}, expected {wanted}")
+    bad = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))
+    if len(bad):
+        raise DataError(f"{trace}: {label} is not finite at sample {bad[0]} ({len(bad)} samples in all)")
+    array.setflags(write=False)
+    return array
+
+
+def _check_steps(trace: str, time: Floats) -> None:
+    steps = np.diff(time)
+    if np.any(steps <= 0.0):
+        raise DataError(f"{trace}: time does not increase at sample {int(np.argmax(steps <= 0.0)) + 1}")
+    mean = steps.mean()
+    uneven = np.abs(steps - mean) > _TIME_TOLERANCE * mean
+    if np.any(uneven):
+        raise DataError(
+            f"{trace}: time steps are uneven (sample {int(np.argmax(uneven)) + 1}: {steps[uneven][0]:.6g} s, "
+            f"mean {mean:.6g} s); resample first, for example with `motion-cueing import`"
+        )

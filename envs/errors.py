@@ -1,0 +1,47 @@
+"""Errors a user can meet: each says which field is wrong and how to mend it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class MotionCueingError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class ConfigurationError(MotionCueingError, ValueError):
+    """A field of a configuration is unknown, missing, of the wrong type or out of range."""
+
+
+class GeometryError(ConfigurationError):
+    """A hexapod that cannot close, or whose neutral pose is singular."""
+
+
+class DataError(MotionCueingError, ValueError):
+    """Data (an array, a CSV file, a saved result) is broken: NaN, wrong shape, missing column."""
+
+
+class ActionError(MotionCueingError, ValueError):
+    """An action that is not nine finite numbers."""
+
+
+class UnknownNameError(MotionCueingError, KeyError):
+    """A name that is not registered; the message lists the nearest known ones."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        self.kind, self.name, self.known = kind, name, sorted(known)
+        super().__init__(f"unknown {kind} {name!r}. {suggest(name, self.known)}")
+
+    def __str__(self) -> str:
+        # KeyError would show the repr of the message.
+        return str(self.args[0])
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """A sentence with the nearest known names, or with all of them where none is near."""
+    names = sorted(known)
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    if near:
+        return "Did you mean " + " or ".join(near) + "?"
+    return "Known: " + ", ".join(names) + "."

@@ -1,0 +1,84 @@
+"""Configurations: frozen, checked dataclasses that round-trip through YAML.
+
+A configuration class is a pydantic dataclass made with :data:`STRICT`: unknown fields, wrong
+types, NaN and infinity are refused when it is made. Ranges are declared with the types below.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, Any, Final, TypeVar
+
+import yaml
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from .errors import ConfigurationError, DataError, suggest
+from .storage import write_text
+
+STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
+
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+
+T = TypeVar("T")
+
+
+def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:
+    """Make ``cls`` of nested plain values.
+
+    Raises:
+        ConfigurationError: naming ``source``, each wrong field and, for an unknown one, the nearest known.
+    """
+    if not isinstance(values, dict):
+        raise ConfigurationError(f"{source}: expected fields of {cls.__name__}, found {type(values).__name__}")
+    try:
+        return TypeAdapter(cls).validate_python(values)
+    except ValidationError as error:
+        raise ConfigurationError(f"{source}: {describe(error, cls)}") from None
+
+
+def describe(error: ValidationError, cls: type[Any]) -> str:
+    """One sentence a wrong field, with its path, what was found and what is allowed."""
+    known = [field.name for field in dataclasses.fields(cls)]
+    return "; ".join(_describe_one(dict(item), known) for item in error.errors())
+
+
+def _describe_one(item: dict[str, Any], known: list[str]) -> str:
+    path = ".".join(str(part) for part in item["loc"]) or "value"
+    if item["type"] == "unexpected_keyword_argument":
+        return f"unknown field {path!r}. {suggest(path.rsplit('.')[-1], known)}"
+    if item["type"] == "missing":
+        return f"field {path!r} is missing"
+    message = str(item["msg"]).removeprefix("Value error, ")
+    return f"field {path!r}: {message} (found {item['input']!r})"
+
+
+def to_dict(config: Any) -> dict[str, Any]:
+    """Plain nested values of a configuration, as YAML and JSON hold them."""
+    values = TypeAdapter(type(config)).dump_python(config, mode="json")
+    assert isinstance(values, dict)
+    return values
+
+
+def load(cls: type[T], path: str | Path) -> T:
+    """Read a configuration from a YAML file.
+
+    Raises:
+        DataError: the file cannot be read or is not YAML.
+        ConfigurationError: a field is unknown, missing or out of range.
+    """
+    try:
+        values = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: cannot be read ({error})") from None
+    except yaml.YAMLError as error:
+        raise DataError(f"{path}: not YAML ({str(error).splitlines()[0]})") from None
+    return from_dict(cls, values, str(path))
+
+
+def save(config: Any, path: str | Path) -> None:
+    """Write a configuration as YAML, whole or not at all."""
+    write_text(path, yaml.safe_dump(to_dict(config), sort_keys=False))
