@@ -1,0 +1,271 @@
+"""What happened in one drive: cues wanted and felt, the machine's motion, the use of its limits; in one file."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..envs.errors import DataError
+from ..envs.storage import write_bytes
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.uint8]
+
+SCHEMA: Final = 1
+"""Version of the file; a reader refuses others."""
+
+AT_DISPLACEMENT: Final = 1
+"""Bit of :attr:`Trajectory.limits_active`: an actuator brakes before its end of travel, or rests there."""
+AT_VELOCITY: Final = 2
+"""Bit of :attr:`Trajectory.limits_active`: the velocity limit holds."""
+AT_ACCELERATION: Final = 4
+"""Bit of :attr:`Trajectory.limits_active`: the acceleration limit holds."""
+
+ACTUATORS: Final = (
+    "carriage_x",
+    "carriage_y",
+    "leg_1",
+    "leg_2",
+    "leg_3",
+    "leg_4",
+    "leg_5",
+    "leg_6",
+    "turntable",
+)
+"""Columns of :attr:`Trajectory.limits_active` and entries of a :class:`LimitTable`."""
+COMMANDS: Final = (
+    "carriage_x",
+    "carriage_y",
+    "hexapod_x",
+    "hexapod_y",
+    "hexapod_z",
+    "hexapod_roll",
+    "hexapod_pitch",
+    "hexapod_yaw",
+    "turntable",
+)
+"""Columns of :attr:`Trajectory.action` and :attr:`Trajectory.applied`."""
+
+_COLUMNS: Final[Mapping[str, tuple[int, ...]]] = {
+    "time": (),
+    "f_wanted": (3,),
+    "w_wanted": (3,),
+    "head_f_wanted": (3,),
+    "f_felt": (3,),
+    "w_felt": (3,),
+    "head_f_felt": (3,),
+    "sensed_f_wanted": (3,),
+    "sensed_w_wanted": (3,),
+    "sensed_f_felt": (3,),
+    "sensed_w_felt": (3,),
+    "carriage": (2,),
+    "carriage_rate": (2,),
+    "hexapod": (6,),
+    "hexapod_rate": (6,),
+    "turntable": (),
+    "turntable_rate": (),
+    "legs": (6,),
+    "legs_rate": (6,),
+    "action": (9,),
+    "applied": (9,),
+    "limits_active": (9,),
+    "step_time": (),
+}
+_LIMITS: Final = ("position_min", "position_max", "velocity", "acceleration")
+_NAMES: Final = ("maneuver", "policy", "platform", "car")
+
+
+@dataclass(frozen=True, eq=False)
+class LimitTable:
+    """Limits of the nine actuators, in the order of :data:`ACTUATORS`; infinity where there is none.
+
+    Args:
+        position_min: (9,) lowest position relative to neutral: carriage and legs m, turntable rad.
+        position_max: (9,) highest position.
+        velocity: (9,) largest speed, m/s and rad/s.
+        acceleration: (9,) largest acceleration, m/s^2 and rad/s^2.
+    """
+
+    position_min: Floats
+    position_max: Floats
+    velocity: Floats
+    acceleration: Floats
+
+    def __post_init__(self) -> None:
+        for name in _LIMITS:
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != (len(ACTUATORS),) or np.isnan(array).any():
+                raise DataError(f"limits: {name} must be {len(ACTUATORS)} numbers, found shape {array.shape}")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One drive of one policy. Row k is the machine at ``time[k]``; row 0 is the start, before any action.
+
+    Arrays are copied, checked and made read-only. "Wanted" is what the driver feels in the car, "felt" what
+    the driver feels in the simulator, at the cab's reference point (F_A and F_S) unless the head is named.
+    x forward, y right, z down.
+
+    Args:
+        maneuver: Name of the cue trace.
+        policy: Name of the policy.
+        platform: Name of the motion base.
+        car: Name of the car.
+        time: (n,) s, strictly increasing.
+        f_wanted: (n, 3) specific force at the cab point of the car, m/s^2.
+        w_wanted: (n, 3) angular velocity of the car, rad/s.
+        head_f_wanted: (n, 3) specific force at the driver's head in the car, m/s^2.
+        f_felt: (n, 3) specific force at the cab point of the simulator, in F_S, m/s^2.
+        w_felt: (n, 3) angular velocity of the cab, in F_S, rad/s.
+        head_f_felt: (n, 3) specific force at the head in the simulator, m/s^2.
+        sensed_f_wanted: (n, 3) otolith output for the car over the static gain 0.4, m/s^2.
+        sensed_w_wanted: (n, 3) canal output for the car, rad/s.
+        sensed_f_felt: (n, 3) the same for the simulator.
+        sensed_w_felt: (n, 3) the same for the simulator.
+        carriage: (n, 2) position x, y of the carriage, m.
+        carriage_rate: (n, 2) m/s.
+        hexapod: (n, 6) x, y, z, roll, pitch, yaw from neutral, m and rad.
+        hexapod_rate: (n, 6) their rates (Euler rates), m/s and rad/s.
+        turntable: (n,) angle, rad.
+        turntable_rate: (n,) rad/s.
+        legs: (n, 6) extensions from neutral, m.
+        legs_rate: (n, 6) m/s.
+        action: (n, 9) accelerations asked in the step that ended at this row, by :data:`COMMANDS`;
+            m/s^2 and rad/s^2; zero in row 0.
+        applied: (n, 9) accelerations that truly acted in that step.
+        limits_active: (n, 9) bits :data:`AT_DISPLACEMENT`, :data:`AT_VELOCITY`, :data:`AT_ACCELERATION`
+            of each of the :data:`ACTUATORS`.
+        step_time: (n,) wall-clock seconds the policy took for the step; NaN in row 0 or where not measured.
+        limits: The machine's limits.
+        metadata: Versions, parameters and the like, each a string.
+
+    Raises:
+        DataError: a shape is wrong, a value is not finite, or time does not increase.
+    """
+
+    maneuver: str
+    policy: str
+    platform: str
+    car: str
+    time: Floats
+    f_wanted: Floats
+    w_wanted: Floats
+    head_f_wanted: Floats
+    f_felt: Floats
+    w_felt: Floats
+    head_f_felt: Floats
+    sensed_f_wanted: Floats
+    sensed_w_wanted: Floats
+    sensed_f_felt: Floats
+    sensed_w_felt: Floats
+    carriage: Floats
+    carriage_rate: Floats
+    hexapod: Floats
+    hexapod_rate: Floats
+    turntable: Floats
+    turntable_rate: Floats
+    legs: Floats
+    legs_rate: Floats
+    action: Floats
+    applied: Floats
+    limits_active: Flags
+    step_time: Floats
+    limits: LimitTable
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = len(np.atleast_1d(self.time))
+        if n < 2:
+            raise DataError(f"trajectory {self.label}: time has {n} samples, at least 2 are needed")
+        for name, tail in _COLUMNS.items():
+            object.__setattr__(self, name, _checked(self.label, name, getattr(self, name), (n, *tail)))
+        late = np.flatnonzero(np.diff(self.time) <= 0.0)
+        if len(late):
+            raise DataError(f"trajectory {self.label}: time does not increase at sample {late[0] + 1}")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def label(self) -> str:
+        """Maneuver and policy, for messages."""
+        return f"{self.maneuver}/{self.policy}"
+
+    @property
+    def dt(self) -> float:
+        """Mean time step, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self) - 1))
+
+    @property
+    def positions(self) -> Floats:
+        """(n, 9) positions of the :data:`ACTUATORS`, m and rad."""
+        return np.column_stack([self.carriage, self.legs, self.turntable])
+
+    def save(self, path: str | Path) -> None:
+        """Write everything to one ``.npz`` file, whole or not at all."""
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _COLUMNS}
+        arrays |= {f"limit_{name}": getattr(self.limits, name) for name in _LIMITS}
+        about = {name: getattr(self, name) for name in _NAMES}
+        about |= {"schema": SCHEMA, "metadata": dict(self.metadata)}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, about=np.array(json.dumps(about)), **arrays)
+        write_bytes(path, buffer.getvalue())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Trajectory:
+        """Read a file that :meth:`save` wrote.
+
+        Raises:
+            DataError: the file is missing, broken, or of another version.
+        """
+        content = _read(path)
+        try:
+            about = json.loads(str(content.pop("about")))
+            if about["schema"] != SCHEMA:
+                raise DataError(
+                    f"{path}: trajectory of version {about['schema']}, this package reads {SCHEMA}"
+                )
+            limits = LimitTable(**{name: content.pop(f"limit_{name}") for name in _LIMITS})
+            names: dict[str, Any] = {name: str(about[name]) for name in _NAMES}
+            columns: dict[str, Any] = {name: content[name] for name in _COLUMNS}
+            return cls(**names, **columns, limits=limits, metadata=about["metadata"])
+        except (KeyError, TypeError, json.JSONDecodeError) as error:
+            raise DataError(f"{path}: not a saved trajectory, or broken ({error})") from None
+
+
+def _read(path: str | Path) -> dict[str, Any]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if not isinstance(file, np.lib.npyio.NpzFile):
+                raise DataError(f"{path}: one array, not a saved trajectory")
+            return {name: file[name] for name in file.files}
+    except DataError:
+        raise
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zipfile.LargeZipFile, TypeError) as error:
+        raise DataError(f"{path}: cannot be read as a trajectory ({error})") from None
+
+
+def _checked(label: str, name: str, values: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+    kind = np.uint8 if name == "limits_active" else np.float64
+    try:
+        array = np.array(values, dtype=kind)
+    except (TypeError, ValueError, OverflowError):
+        raise DataError(f"trajectory {label}: {name} is not an array of numbers") from None
+    if array.shape != shape:
+        raise DataError(f"trajectory {label}: {name} has shape {array.shape}, expected {shape}")
+    broken = np.isinf(array) if name == "step_time" else ~np.isfinite(array)
+    if broken.any():
+        row = int(np.argwhere(broken)[0][0])
+        raise DataError(f"trajectory {label}: {name} is not finite at sample {row}")
+    array.setflags(write=False)
+    return array
