@@ -1,4 +1,4 @@
-"""What happened in one drive: cues wanted and felt, the machine's motion, the use of its limits; in one file."""
+"""What happened in one drive: cues wanted and felt, motion of the machine, use of its limits; in one file."""
 
 from __future__ import annotations
 

@@ -1,0 +1,45 @@
+"""The thresholds every metric is measured against."""
+
+from __future__ import annotations
+
+from math import radians
+
+from pydantic.dataclasses import dataclass
+
+from ..envs.settings import STRICT, Positive, Vector3
+
+
+@dataclass(frozen=True, config=STRICT)
+class Criteria:
+    """Published thresholds; the defaults are what every table of this project uses.
+
+    Args:
+        indifference_force: Error of specific force no driver minds, m/s^2 (Slob et al., Bosch Rexroth).
+        indifference_rate: Error of angular velocity no driver minds, rad/s (the same; 3 deg/s).
+        force_threshold: Perception of specific force x, y, z, m/s^2 (Reid and Nahon, from memory).
+        rate_threshold: Perception of angular velocity x, y, z, rad/s (Zacharias; Reid and Nahon;
+            3.0, 3.6, 2.6 deg/s).
+        tilt_rate: Rate up to which tilt coordination goes unnoticed, rad/s (3 deg/s, SIMONA).
+        delay_range: Largest delay or lead searched, s; a cue that comes later is a missing cue instead.
+        delay_correlation: Least correlation at which a delay is reported at all.
+        action_tolerance: An applied acceleration this near the asked one is not clipped, m/s^2 and rad/s^2.
+    """
+
+    indifference_force: Positive = 0.6
+    indifference_rate: Positive = radians(3.0)
+    force_threshold: Vector3 = (0.17, 0.17, 0.28)
+    rate_threshold: Vector3 = (radians(3.0), radians(3.6), radians(2.6))
+    tilt_rate: Positive = radians(3.0)
+    delay_range: Positive = 1.0
+    delay_correlation: Positive = 0.5
+    action_tolerance: Positive = 1e-4
+
+    @property
+    def scales(self) -> tuple[float, ...]:
+        """Indifference zone of f x, y, z and w x, y, z."""
+        return (self.indifference_force,) * 3 + (self.indifference_rate,) * 3
+
+    @property
+    def thresholds(self) -> tuple[float, ...]:
+        """Perception thresholds of f x, y, z and w x, y, z."""
+        return self.force_threshold + self.rate_threshold

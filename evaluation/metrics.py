@@ -1,0 +1,249 @@
+"""The metrics of a drive; docs/metrics.md defines each with its unit and source."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from ..envs.cues import GRAVITY
+from ..envs.settings import STRICT
+from . import signals
+from .criteria import Criteria
+from .trajectory import ACTUATORS, AT_ACCELERATION, AT_DISPLACEMENT, AT_VELOCITY, COMMANDS, Floats, Trajectory
+
+AXES: Final = ("f_x", "f_y", "f_z", "w_x", "w_y", "w_z")
+"""Specific force (m/s^2) and angular velocity (rad/s) in the cab's axes."""
+
+_REST: Final = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
+"""What a driver at rest on level ground feels on each of the axes."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class AxisMetrics:
+    """Metrics of one axis; units of the axis (m/s^2 or rad/s) unless another is named.
+
+    Args:
+        rmse: Root mean square of felt minus wanted.
+        nrmse: RMSE over the RMS of the car's motion, or over the perception threshold if that is larger.
+        correlation: Pearson's; None where a signal is constant.
+        delay: Of the simulator behind the car, s; None where there is no such peak of correlation.
+        false_cues: Share of time with motion of the wrong sign, or noticeable where the car has none.
+        missing_cues: Share of time without noticeable motion where the car has it.
+        cue_error: This axis's part of J.
+        cue_error_false: The part of ``cue_error`` that arises during false cues.
+        cue_error_missing: The part of ``cue_error`` that arises during missing cues.
+        perceived_rmse: RMSE of the sensed signals.
+        perceived_nrmse: Normalised RMSE of the sensed signals.
+        perceived_cue_error: This axis's part of the perceived J.
+    """
+
+    rmse: float
+    nrmse: float
+    correlation: float | None
+    delay: float | None
+    false_cues: float
+    missing_cues: float
+    cue_error: float
+    cue_error_false: float
+    cue_error_missing: float
+    perceived_rmse: float
+    perceived_nrmse: float
+    perceived_cue_error: float
+
+
+@dataclass(frozen=True, config=STRICT)
+class ActuatorMetrics:
+    """Use of one actuator.
+
+    Args:
+        stroke: Largest distance from neutral, m or rad.
+        stroke_share: The same as a share of the way to the limit; None without a limit or without travel.
+        at_limit: Share of time at any limit.
+    """
+
+    stroke: float
+    stroke_share: float | None
+    at_limit: float
+
+
+@dataclass(frozen=True, config=STRICT)
+class Metrics:
+    """All metrics of one drive.
+
+    Args:
+        duration: Length of the drive, s.
+        cue_error: J, the headline: squared error over the indifference zone, averaged; 0 is perfect.
+        perceived_cue_error: J of the sensed signals.
+        axes: By :data:`AXES`.
+        false_cues: Share of time with a false cue on any axis.
+        missing_cues: Share of time with a missing cue on any axis.
+        tilt_rate_peak: Largest roll and pitch rate beyond the car's own, rad/s.
+        tilt_rate_share: Share of time with such a rate above the tilt-coordination limit.
+        actuators: By :data:`~.trajectory.ACTUATORS`.
+        travel: Largest magnitude of each hexapod coordinate from neutral, m and rad.
+        at_limit: Share of time with any actuator at any limit.
+        at_displacement: Share of time with a displacement limit active.
+        at_velocity: Share of time with a velocity limit active.
+        at_acceleration: Share of time with an acceleration limit active.
+        clipped: Share of steps whose applied acceleration differs from the asked one.
+        step_time_mean: Mean time the policy takes a step, s; None where not measured.
+        step_time_p99: 99th percentile of it, s.
+    """
+
+    duration: float
+    cue_error: float
+    perceived_cue_error: float
+    axes: dict[str, AxisMetrics]
+    false_cues: float
+    missing_cues: float
+    tilt_rate_peak: float
+    tilt_rate_share: float
+    actuators: dict[str, ActuatorMetrics]
+    travel: dict[str, float]
+    at_limit: float
+    at_displacement: float
+    at_velocity: float
+    at_acceleration: float
+    clipped: float
+    step_time_mean: float | None
+    step_time_p99: float | None
+
+    @property
+    def worst_axis(self) -> str:
+        """The axis with the largest part of J."""
+        return max(self.axes, key=lambda axis: self.axes[axis].cue_error)
+
+
+def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics:
+    """All metrics of a trajectory."""
+    criteria = criteria or Criteria()
+    wanted, felt = cab_motion(trajectory)
+    axes = _axes(trajectory, criteria)
+    false, missing = np.zeros(len(trajectory), bool), np.zeros(len(trajectory), bool)
+    for i, threshold in enumerate(criteria.thresholds):
+        false |= signals.false_cues(wanted[:, i], felt[:, i], threshold)
+        missing |= signals.missing_cues(wanted[:, i], felt[:, i], threshold)
+    rate = tilt_rate(trajectory)
+    mean, p99 = _step_time(trajectory.step_time)
+    flags = trajectory.limits_active
+    return Metrics(
+        duration=float(trajectory.time[-1] - trajectory.time[0]),
+        cue_error=sum(axis.cue_error for axis in axes.values()),
+        perceived_cue_error=sum(axis.perceived_cue_error for axis in axes.values()),
+        axes=axes,
+        false_cues=float(false.mean()),
+        missing_cues=float(missing.mean()),
+        tilt_rate_peak=float(rate.max()),
+        tilt_rate_share=float(np.mean(rate > criteria.tilt_rate * (1.0 + signals.FLAT))),
+        actuators=_actuators(trajectory),
+        travel=dict(zip(COMMANDS[2:8], np.abs(trajectory.hexapod).max(axis=0).tolist(), strict=True)),
+        at_limit=float(np.any(flags, axis=1).mean()),
+        at_displacement=float(np.any(flags & AT_DISPLACEMENT, axis=1).mean()),
+        at_velocity=float(np.any(flags & AT_VELOCITY, axis=1).mean()),
+        at_acceleration=float(np.any(flags & AT_ACCELERATION, axis=1).mean()),
+        clipped=_clipped(trajectory, criteria.action_tolerance),
+        step_time_mean=mean,
+        step_time_p99=p99,
+    )
+
+
+def cab_motion(trajectory: Trajectory) -> tuple[Floats, Floats]:
+    """Wanted and felt motion at the cab point, (n, 6) by :data:`AXES`, zero at rest on level ground."""
+    wanted = np.column_stack([trajectory.f_wanted, trajectory.w_wanted]) - _REST
+    felt = np.column_stack([trajectory.f_felt, trajectory.w_felt]) - _REST
+    return wanted, felt
+
+
+def sensed_motion(trajectory: Trajectory) -> tuple[Floats, Floats]:
+    """Sensed motion in car and simulator, (n, 6) by :data:`AXES`, zero at rest on level ground."""
+    wanted = np.column_stack([trajectory.sensed_f_wanted, trajectory.sensed_w_wanted]) - _REST
+    felt = np.column_stack([trajectory.sensed_f_felt, trajectory.sensed_w_felt]) - _REST
+    return wanted, felt
+
+
+def cue_error(wanted: Floats, felt: Floats, criteria: Criteria | None = None) -> Floats:
+    """(n,) |df|^2 / (0.6 m/s^2)^2 + |dw|^2 / (3 deg/s)^2, whose mean over time is J.
+
+    Args:
+        wanted: (n, 6) by :data:`AXES`.
+        felt: (n, 6) the same of the simulator.
+        criteria: The indifference zone.
+    """
+    scales = np.array((criteria or Criteria()).scales)
+    return np.asarray(np.sum(((felt - wanted) / scales) ** 2, axis=1))
+
+
+def tilt_rate(trajectory: Trajectory) -> Floats:
+    """(n,) magnitude of the cab's roll and pitch rate beyond the car's own, rad/s.
+
+    Measured at the cab, where the driver sits, so that it holds for any policy. A cab that rolls with its
+    car, or less, has none; a machine that stands still has none.
+    """
+    extra = signals.beyond(trajectory.w_wanted[:, :2], trajectory.w_felt[:, :2])
+    return np.asarray(np.hypot(extra[:, 0], extra[:, 1]))
+
+
+def _axes(trajectory: Trajectory, criteria: Criteria) -> dict[str, AxisMetrics]:
+    motions = np.stack([*cab_motion(trajectory), *sensed_motion(trajectory)])
+    return {axis: _axis(motions[:, :, i], trajectory.dt, criteria, i) for i, axis in enumerate(AXES)}
+
+
+def _axis(motions: Floats, dt: float, criteria: Criteria, i: int) -> AxisMetrics:
+    """Metrics of axis ``i`` from its (4, n) motions: wanted, felt, sensed wanted, sensed felt."""
+    wanted, felt, sensed, sensed_felt = motions
+    threshold, scale = criteria.thresholds[i], criteria.scales[i]
+    error = ((felt - wanted) / scale) ** 2
+    false = signals.false_cues(wanted, felt, threshold)
+    missing = signals.missing_cues(wanted, felt, threshold)
+    # Below the threshold there is nothing whose delay a driver could feel.
+    moves = min(np.abs(wanted).max(), np.abs(felt).max()) > threshold
+    reach, least = criteria.delay_range, criteria.delay_correlation
+    return AxisMetrics(
+        rmse=signals.rms(felt - wanted),
+        nrmse=signals.normalised_rmse(wanted, felt, threshold),
+        correlation=signals.pearson(wanted, felt),
+        delay=signals.delay(wanted, felt, dt, reach, least) if moves else None,
+        false_cues=float(false.mean()),
+        missing_cues=float(missing.mean()),
+        cue_error=float(error.mean()),
+        cue_error_false=float(np.mean(error * false)),
+        cue_error_missing=float(np.mean(error * missing)),
+        perceived_rmse=signals.rms(sensed_felt - sensed),
+        perceived_nrmse=signals.normalised_rmse(sensed, sensed_felt, threshold),
+        perceived_cue_error=float(np.mean(((sensed_felt - sensed) / scale) ** 2)),
+    )
+
+
+def _actuators(trajectory: Trajectory) -> dict[str, ActuatorMetrics]:
+    limits, positions = trajectory.limits, trajectory.positions
+    active = np.mean(trajectory.limits_active != 0, axis=0)
+    return {
+        name: ActuatorMetrics(
+            stroke=float(np.abs(positions[:, i]).max()),
+            stroke_share=_stroke_share(positions[:, i], limits.position_min[i], limits.position_max[i]),
+            at_limit=float(active[i]),
+        )
+        for i, name in enumerate(ACTUATORS)
+    }
+
+
+def _stroke_share(position: Floats, low: float, high: float) -> float | None:
+    """Share of the way from neutral to the nearer-reached limit."""
+    if not (np.isfinite(low) and np.isfinite(high) and low < 0.0 < high):
+        return None
+    return float(max(position.max() / high, position.min() / low))
+
+
+def _clipped(trajectory: Trajectory, tolerance: float) -> float:
+    # Row 0 is the start: no action led to it.
+    gap = np.abs(trajectory.applied[1:] - trajectory.action[1:])
+    return float(np.mean(np.any(gap > tolerance, axis=1)))
+
+
+def _step_time(step_time: Floats) -> tuple[float | None, float | None]:
+    measured = step_time[np.isfinite(step_time)]
+    if not len(measured):
+        return None, None
+    return float(measured.mean()), float(np.percentile(measured, 99.0))

@@ -1,0 +1,115 @@
+"""How one signal resembles another: pure functions of arrays; docs/metrics.md has formulas and sources."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FLAT: Final = 1e-6
+"""A standard deviation below this (m/s^2, rad/s) is rounding: the signal counts as constant."""
+
+
+def rms(values: Floats) -> float:
+    """Root mean square of (n,) values."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def normalised_rmse(wanted: Floats, felt: Floats, floor: float) -> float:
+    """RMSE over the larger of the RMS of ``wanted`` and ``floor``; both signals are zero at rest.
+
+    No motion has 1 where the car moves; the floor keeps an axis finite in which it does not.
+    """
+    return rms(felt - wanted) / max(rms(wanted), floor)
+
+
+def pearson(wanted: Floats, felt: Floats) -> float | None:
+    """Pearson's correlation of two (n,) signals; None where one of them is constant."""
+    a, b = wanted - wanted.mean(), felt - felt.mean()
+    spread = rms(a), rms(b)
+    if min(spread) < FLAT:
+        return None
+    return float(np.clip(np.mean(a * b) / (spread[0] * spread[1]), -1.0, 1.0))
+
+
+def correlation_by_lag(wanted: Floats, felt: Floats, reach: int) -> Floats:
+    """(2 reach + 1,) Pearson correlations of ``wanted[k]`` and ``felt[k + lag]`` over their overlap.
+
+    Lags run from -reach to reach; NaN where a signal is constant on the overlap.
+    """
+    n = len(wanted)
+    a, b = wanted - wanted.mean(), felt - felt.mean()
+    lags = np.arange(-reach, reach + 1)
+    products = correlate(b, a, mode="full", method="fft")[n - 1 + lags]
+    # The overlap in `wanted` is [start, start + count), in `felt` [start + lag, start + lag + count).
+    start, count = np.maximum(0, -lags), n - np.abs(lags)
+    mean_a, square_a = _window(a, start, count)
+    mean_b, square_b = _window(b, start + lags, count)
+    spread = np.sqrt(np.maximum(square_a - mean_a**2, 0.0) * np.maximum(square_b - mean_b**2, 0.0))
+    flat = spread < FLAT**2
+    return np.asarray(
+        np.where(flat, np.nan, (products / count - mean_a * mean_b) / np.where(flat, 1.0, spread))
+    )
+
+
+def _window(values: Floats, start: NDArray[np.int_], count: NDArray[np.int_]) -> tuple[Floats, Floats]:
+    """Mean and mean square of ``values[start : start + count]`` for each pair."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    squares = np.concatenate([[0.0], np.cumsum(values**2)])
+    return (sums[start + count] - sums[start]) / count, (squares[start + count] - squares[start]) / count
+
+
+def delay(wanted: Floats, felt: Floats, dt: float, reach: float, least: float) -> float | None:
+    """How much later ``felt`` does what ``wanted`` does, s; negative where it leads.
+
+    The lag of the highest correlation, refined by a parabola through the peak and its two neighbours.
+
+    Args:
+        wanted: (n,) signal of the car.
+        felt: (n,) signal of the simulator.
+        dt: Time step, s.
+        reach: Largest lag searched either way, s.
+        least: Correlation that the peak must have.
+
+    Returns:
+        None where no peak lies inside the search or it is lower than ``least``: no delay to speak of.
+    """
+    # At least three quarters of the drive overlap at every lag.
+    samples = min(round(reach / dt), len(wanted) // 4)
+    if samples < 1:
+        return None
+    values = correlation_by_lag(wanted, felt, samples)
+    if np.isnan(values).any():
+        return None
+    peak = int(np.argmax(values))
+    if peak in (0, len(values) - 1) or values[peak] < least:
+        return None
+    before, at, after = values[peak - 1 : peak + 2]
+    bend = before - 2.0 * at + after
+    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    return float((peak - samples + shift) * dt)
+
+
+def false_cues(wanted: Floats, felt: Floats, threshold: float) -> Mask:
+    """(n,) where the simulator noticeably moves against the car, or while the car does not noticeably move.
+
+    The difference itself must be noticeable: 0.18 for 0.16 at a threshold of 0.17 is no false cue.
+    """
+    against = (np.abs(wanted) <= threshold) | (wanted * felt < 0.0)
+    return np.asarray((np.abs(felt) > threshold) & against & (np.abs(felt - wanted) > threshold))
+
+
+def missing_cues(wanted: Floats, felt: Floats, threshold: float) -> Mask:
+    """(n,) where the car noticeably moves, the simulator does not, and the difference is noticeable."""
+    silent = np.abs(felt) <= threshold
+    return np.asarray((np.abs(wanted) > threshold) & silent & (np.abs(felt - wanted) > threshold))
+
+
+def beyond(wanted: Floats, felt: Floats) -> Floats:
+    """The part of ``felt`` outside the interval between zero and ``wanted``: motion nobody asked for."""
+    return np.asarray(felt - np.clip(felt, np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)))
