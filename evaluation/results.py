@@ -1,0 +1,162 @@
+"""The result of an evaluation as ``results.json`` and ``results.csv``; see docs/results-format.md."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import JsonValue
+from pydantic.dataclasses import dataclass
+
+from ..envs.errors import DataError
+from ..envs.settings import STRICT, from_dict, to_dict
+from ..envs.storage import write_text
+from .criteria import Criteria
+from .metrics import Metrics
+from .verdict import Standing, Verdict, judge, judge_suite
+
+SCHEMA: Final = 1
+"""Version of ``results.json``; a reader refuses others."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class Failure:
+    """A drive that gave no result.
+
+    Args:
+        maneuver: Name of the maneuver.
+        policy: Name of the policy; None where the maneuver itself could not be made.
+        message: What went wrong.
+    """
+
+    maneuver: str
+    policy: str | None
+    message: str
+
+
+@dataclass(frozen=True, config=STRICT)
+class Provenance:
+    """What made the results.
+
+    Args:
+        command: The command line.
+        created: UTC, ISO 8601.
+        versions: Of this package, Python and the libraries that matter.
+        platform: Name of the motion base.
+        car: Name of the car.
+        configuration: Everything in force: ``platform``, ``car``, and the metadata of each of ``policies``.
+    """
+
+    command: str
+    created: str
+    versions: dict[str, str]
+    platform: str
+    car: str
+    configuration: dict[str, JsonValue]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Results:
+    """Everything an evaluation found.
+
+    Args:
+        schema: :data:`SCHEMA`.
+        provenance: What made the results.
+        maneuvers: Metrics by maneuver and policy.
+        verdicts: One a maneuver, then that of the suite ("all").
+        standings: Policies over the suite, best first.
+        failures: Drives without a result.
+        criteria: The thresholds the metrics were measured with.
+    """
+
+    schema: int
+    provenance: Provenance
+    maneuvers: dict[str, dict[str, Metrics]]
+    verdicts: tuple[Verdict, ...]
+    standings: tuple[Standing, ...]
+    failures: tuple[Failure, ...]
+    criteria: Criteria
+
+    @classmethod
+    def of(
+        cls,
+        maneuvers: dict[str, dict[str, Metrics]],
+        failures: list[Failure],
+        provenance: Provenance,
+        criteria: Criteria | None = None,
+    ) -> Results:
+        """Judge the metrics and put everything together."""
+        finished = {name: drives for name, drives in maneuvers.items() if drives}
+        verdicts = [judge(name, drives) for name, drives in finished.items()]
+        overall, standings = judge_suite(finished)
+        if overall is not None:
+            verdicts.append(overall)
+        return cls(
+            schema=SCHEMA,
+            provenance=provenance,
+            maneuvers=finished,
+            verdicts=tuple(verdicts),
+            standings=tuple(standings),
+            failures=tuple(failures),
+            criteria=criteria or Criteria(),
+        )
+
+    @property
+    def overall(self) -> Verdict | None:
+        """The verdict of the suite."""
+        return next((verdict for verdict in self.verdicts if verdict.maneuver == "all"), None)
+
+    @property
+    def policies(self) -> list[str]:
+        """Names of the policies, best first where they have a standing."""
+        ranked = [standing.policy for standing in self.standings]
+        found = {policy for drives in self.maneuvers.values() for policy in drives}
+        return ranked + sorted(found - set(ranked))
+
+    def save_json(self, path: str | Path) -> None:
+        """Write ``results.json``, whole or not at all."""
+        write_text(path, json.dumps(to_dict(self), indent=1, allow_nan=False) + "\n")
+
+    @classmethod
+    def load_json(cls, path: str | Path) -> Results:
+        """Read ``results.json``.
+
+        Raises:
+            DataError: the file is missing, broken, or of another version.
+        """
+        try:
+            values = json.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise DataError(f"{path}: cannot be read as results ({error})") from None
+        found = values.get("schema") if isinstance(values, dict) else None
+        if found != SCHEMA:
+            raise DataError(f"{path}: results of version {found}, this package reads {SCHEMA}")
+        return from_dict(cls, values, str(path))
+
+    def save_csv(self, path: str | Path) -> None:
+        """Write ``results.csv``: one row a drive, one column a metric, nothing where undefined."""
+        rows = [
+            {"maneuver": maneuver, "policy": policy} | dict(_flat(to_dict(metrics)))
+            for maneuver, drives in self.maneuvers.items()
+            for policy, metrics in drives.items()
+        ]
+        buffer = io.StringIO()
+        writer = csv.DictWriter(
+            buffer, list(rows[0]) if rows else ["maneuver", "policy"], lineterminator="\n"
+        )
+        writer.writeheader()
+        writer.writerows(rows)
+        write_text(path, buffer.getvalue())
+
+
+def _flat(values: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested values as ``axes.f_x.rmse``."""
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
