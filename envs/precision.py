@@ -14,7 +14,10 @@ import warp as wp
 
 from .errors import ConfigurationError
 
-wp.config.quiet = True
+# A machine without a GPU is no reason for a warning; later warnings are.
+wp.config.log_level = wp.LOG_ERROR
+wp.init()
+wp.config.log_level = wp.LOG_WARNING
 
 _NAME: Final = os.environ.get("MOTION_CUEING_PRECISION", "double")
 if _NAME not in ("single", "double"):
@@ -33,3 +36,4 @@ vec9: Any = wp.types.vector(9, real)
 mat22: Any = wp.types.matrix((2, 2), real)
 mat33: Any = wp.types.matrix((3, 3), real)
 mat63: Any = wp.types.matrix((6, 3), real)
+mat65: Any = wp.types.matrix((6, 5), real)

@@ -1,1 +1,5 @@
-"""To be filled."""
+"""What a driver senses: semicircular canals and otoliths."""
+
+from .models import Canals, Otoliths, VestibularModel, get_vestibular_model, vestibular_model_names
+
+__all__ = ["Canals", "Otoliths", "VestibularModel", "get_vestibular_model", "vestibular_model_names"]

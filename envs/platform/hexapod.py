@@ -1,0 +1,149 @@
+"""Hexapod kinematics: leg vectors, lengths, rates, and forward kinematics. Eqs. (11) to (13).
+
+A pose is the displacement s of the platform from neutral, in F_V (S = S_0 + s), and the Euler angles
+beta_H. The Jacobian is kept as two 6 x 3 blocks: leg rates = U Sdot + W omega_HI, so that its inverse
+needs 3 x 3 matrices only, by normal equations.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ..precision import mat33, mat63, real, vec3, vec6
+from .frames import rate_matrix, rate_matrix_inverse, rotation
+
+NEWTON_ITERATIONS = wp.constant(20)
+"""More than Newton ever needs from a neighbouring pose (3 to 5)."""
+
+NEWTON_TOLERANCE = wp.constant(real(1e-13 if real is wp.float64 else 1e-6))
+"""Largest leg error at which the iteration stops, m."""
+
+
+@wp.struct
+class HexapodGeometry:
+    """Constants of a hexapod, in metres."""
+
+    upper: mat63  # A_i in F_H, one row a leg
+    lower: mat63  # B_i in F_V
+    neutral: vec3  # S_0, origin of F_H at neutral, in F_V
+    neutral_lengths: vec6  # L_i
+
+
+@wp.struct
+class Jacobian:
+    """Leg rates for the platform's velocity (U) and inertial angular velocity (W)."""
+
+    u: mat63
+    w: mat63
+
+
+@wp.func
+def leg_vector(g: HexapodGeometry, i: int, displacement: vec3, l_ih: mat33) -> vec3:
+    """Eq. (12): l_iI = L_IH A_i - B_i + S."""
+    upper = vec3(g.upper[i, 0], g.upper[i, 1], g.upper[i, 2])
+    lower = vec3(g.lower[i, 0], g.lower[i, 1], g.lower[i, 2])
+    return l_ih * upper - lower + g.neutral + displacement
+
+
+@wp.func
+def leg_extensions(g: HexapodGeometry, displacement: vec3, beta: vec3) -> vec6:
+    """Eq. (13): l_i = |l_iI| - L_i."""
+    l_ih = rotation(beta)
+    extensions = vec6()
+    for i in range(6):
+        extensions[i] = wp.length(leg_vector(g, i, displacement, l_ih)) - g.neutral_lengths[i]
+    return extensions
+
+
+@wp.func
+def leg_jacobian(g: HexapodGeometry, displacement: vec3, beta: vec3) -> Jacobian:
+    """Rows u_i = l_i / |l_i| and w_i = (L_IH A_i) x u_i: the time derivative of Eq. (13)."""
+    l_ih = rotation(beta)
+    u = mat63()
+    w = mat63()
+    for i in range(6):
+        upper = vec3(g.upper[i, 0], g.upper[i, 1], g.upper[i, 2])
+        direction = wp.normalize(leg_vector(g, i, displacement, l_ih))
+        moment = wp.cross(l_ih * upper, direction)
+        for j in range(3):
+            u[i, j] = direction[j]
+            w[i, j] = moment[j]
+    jacobian = Jacobian()
+    jacobian.u = u
+    jacobian.w = w
+    return jacobian
+
+
+@wp.func
+def leg_rates(jacobian: Jacobian, velocity: vec3, beta: vec3, beta_rate: vec3) -> vec6:
+    """Time derivative of Eq. (13) for the platform's velocity and Euler rates."""
+    omega = rotation(beta) * (rate_matrix(beta) * beta_rate)
+    return jacobian.u * velocity + jacobian.w * omega
+
+
+@wp.func
+def rotational_block(jacobian: Jacobian) -> mat33:
+    """Schur complement of the normal matrix [U W]^T [U W] after the translations."""
+    p = wp.transpose(jacobian.u) * jacobian.u
+    q = wp.transpose(jacobian.u) * jacobian.w
+    return wp.transpose(jacobian.w) * jacobian.w - wp.transpose(q) * (wp.inverse(p) * q)
+
+
+@wp.func
+def manipulability(jacobian: Jacobian) -> real:
+    """det(J)^2 of the whole Jacobian: 0 in a singular pose."""
+    p = wp.transpose(jacobian.u) * jacobian.u
+    return wp.determinant(p) * wp.determinant(rotational_block(jacobian))
+
+
+@wp.func
+def normal_solve(jacobian: Jacobian, translation: vec3, rotation_part: vec3) -> vec6:
+    """Solves J^T J x = b for b given by its two halves."""
+    p_inverse = wp.inverse(wp.transpose(jacobian.u) * jacobian.u)
+    q = wp.transpose(jacobian.u) * jacobian.w
+    omega = wp.inverse(rotational_block(jacobian)) * (
+        rotation_part - wp.transpose(q) * (p_inverse * translation)
+    )
+    velocity = p_inverse * (translation - q * omega)
+    return vec6(velocity[0], velocity[1], velocity[2], omega[0], omega[1], omega[2])
+
+
+@wp.func
+def platform_rates(jacobian: Jacobian, beta: vec3, rates: vec6) -> vec6:
+    """Platform velocity and Euler rates, [sdot, betadot], of given leg rates: J^-1."""
+    twist = normal_solve(jacobian, wp.transpose(jacobian.u) * rates, wp.transpose(jacobian.w) * rates)
+    omega = vec3(twist[3], twist[4], twist[5])
+    beta_rate = rate_matrix_inverse(beta) * (wp.transpose(rotation(beta)) * omega)
+    return vec6(twist[0], twist[1], twist[2], beta_rate[0], beta_rate[1], beta_rate[2])
+
+
+@wp.func
+def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3) -> vec6:
+    """Pose [s, beta] with these leg extensions, by Newton iteration from a neighbouring pose."""
+    s = displacement
+    b = beta
+    error = extensions - leg_extensions(g, s, b)
+    count = int(0)
+    while wp.max(wp.abs(error)) > NEWTON_TOLERANCE and count < NEWTON_ITERATIONS:
+        step = platform_rates(leg_jacobian(g, s, b), b, error)
+        s = s + vec3(step[0], step[1], step[2])
+        b = b + vec3(step[3], step[4], step[5])
+        error = extensions - leg_extensions(g, s, b)
+        count = count + 1
+    return vec6(s[0], s[1], s[2], b[0], b[1], b[2])
+
+
+@wp.func_grad(forward_kinematics)
+def adjoint_forward_kinematics(
+    g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3, adjoint: vec6
+):
+    """Implicit function theorem: d pose / d extensions = J^-1 at the solution; the first guess has no part."""
+    pose = forward_kinematics(g, extensions, displacement, beta)
+    s = vec3(pose[0], pose[1], pose[2])
+    b = vec3(pose[3], pose[4], pose[5])
+    jacobian = leg_jacobian(g, s, b)
+    to_rates = rate_matrix_inverse(b) * wp.transpose(rotation(b))
+    moment = wp.transpose(to_rates) * vec3(adjoint[3], adjoint[4], adjoint[5])
+    force = vec3(adjoint[0], adjoint[1], adjoint[2])
+    x = normal_solve(jacobian, force, moment)
+    wp.adjoint[extensions] += jacobian.u * vec3(x[0], x[1], x[2]) + jacobian.w * vec3(x[3], x[4], x[5])

@@ -1,0 +1,127 @@
+"""From a configured machine to the constants its kernels read."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from ..errors import GeometryError
+from ..precision import mat63, mat65, vec3, vec6, vec9
+from .actuators import ActuatorDynamics, lag_transition
+from .hexapod import HexapodGeometry
+from .machines import Hexapod, Platform
+from .state import Machine
+
+UNLIMITED: Final = 1e9
+"""Travel of an unlimited turntable in the kernels, rad: finite, so that no infinity meets a zero."""
+
+SINGULARITY_SHARE: Final = 0.1
+"""Share of the neutral pose's det(J) below which the hexapod is kept from moving on towards a singular pose."""
+
+_LEAST_CONDITION: Final = 1e-3
+"""Least ratio of smallest to largest singular value of the neutral Jacobian (lengths over the joint radius)."""
+
+LOCKED: Final = 1.0
+"""Velocity and acceleration limit of a missing subsystem, whose travel is zero."""
+
+
+def geometry_of(hexapod: Hexapod) -> Any:
+    """The kernel's constants of a hexapod."""
+    geometry: Any = HexapodGeometry()
+    geometry.upper = mat63(*np.ravel(hexapod.upper_joints))
+    geometry.lower = mat63(*np.ravel(hexapod.lower_joints))
+    geometry.neutral = vec3(*hexapod.neutral)
+    geometry.neutral_lengths = vec6(*hexapod.neutral_lengths)
+    return geometry
+
+
+def neutral_jacobian(hexapod: Hexapod) -> NDArray[np.float64]:
+    """(6, 6) leg rates for the platform's velocity and angular velocity at neutral, where L_IH is unity."""
+    upper = np.array(hexapod.upper_joints)
+    legs = upper - np.array(hexapod.lower_joints) + np.array(hexapod.neutral)
+    directions = legs / np.linalg.norm(legs, axis=1, keepdims=True)
+    return np.hstack([directions, np.cross(upper, directions)])
+
+
+def check_geometry(hexapod: Hexapod) -> None:
+    """Refuse a hexapod that does not hold its platform at neutral.
+
+    Raises:
+        GeometryError: the Jacobian at neutral is singular: legs are parallel or all meet one line.
+    """
+    radius = float(np.mean(np.linalg.norm(hexapod.upper_joints, axis=1)))
+    if radius == 0.0:
+        raise GeometryError("upper_joints: all joints coincide with the origin of F_H")
+    scaled = neutral_jacobian(hexapod) / np.array([1.0, 1.0, 1.0, radius, radius, radius])
+    values = np.linalg.svd(scaled, compute_uv=False)
+    if not values[-1] > _LEAST_CONDITION * values[0]:
+        raise GeometryError(
+            "the hexapod is singular at neutral (smallest over largest singular value "
+            f"{values[-1] / values[0]:.1e}): move upper_joints, lower_joints or neutral so that the legs "
+            "are not parallel and do not all meet one line"
+        )
+
+
+def _limits(platform: Platform) -> dict[str, NDArray[np.float64]]:
+    carriage, hexapod, turntable = platform.carriage, platform.hexapod, platform.turntable
+    low, high = np.zeros(9), np.zeros(9)
+    velocity, acceleration = np.full(9, LOCKED), np.full(9, LOCKED)
+    if carriage is not None:
+        low[:2], high[:2] = np.array([carriage.travel_x, carriage.travel_y]).T
+        velocity[:2], acceleration[:2] = carriage.velocity, carriage.acceleration
+    low[2:8], high[2:8] = hexapod.extension
+    velocity[2:8], acceleration[2:8] = hexapod.velocity, hexapod.acceleration
+    if turntable is not None:
+        low[8], high[8] = turntable.travel or (-UNLIMITED, UNLIMITED)
+        velocity[8], acceleration[8] = turntable.velocity, turntable.acceleration
+    return {"position_min": low, "position_max": high, "velocity": velocity, "acceleration": acceleration}
+
+
+def actuator_limits(platform: Platform) -> dict[str, NDArray[np.float64]]:
+    """position_min, position_max, velocity, acceleration, each (9,), for people: unlimited is infinite."""
+    limits = _limits(platform)
+    limits["position_min"][limits["position_min"] <= -UNLIMITED] = -np.inf
+    limits["position_max"][limits["position_max"] >= UNLIMITED] = np.inf
+    return limits
+
+
+def dead_steps(platform: Platform, dt: float) -> list[int]:
+    """Dead times of carriage, hexapod and turntable in time steps."""
+    return [round(dynamics.dead_time / dt) for dynamics in _dynamics(platform)]
+
+
+def _dynamics(platform: Platform) -> list[ActuatorDynamics]:
+    unity = ActuatorDynamics()
+    return [
+        platform.carriage.dynamics if platform.carriage else unity,
+        platform.hexapod.dynamics,
+        platform.turntable.dynamics if platform.turntable else unity,
+    ]
+
+
+def machine_parameters(platform: Platform, dt: float) -> Any:
+    """The kernel's :class:`~.state.Machine` of a platform at a time step, s.
+
+    Raises:
+        GeometryError: the hexapod is singular at neutral.
+    """
+    check_geometry(platform.hexapod)
+    machine: Any = Machine()
+    machine.geometry = geometry_of(platform.hexapod)
+    machine.singularity_guard = (
+        SINGULARITY_SHARE * np.linalg.det(neutral_jacobian(platform.hexapod))
+    ) ** 2
+    for name, values in _limits(platform).items():
+        setattr(machine, name, vec9(*values))
+    cab = np.array(platform.cab.reference_point)
+    machine.cab = vec3(*cab)
+    machine.head = vec3(*(cab + np.array(platform.cab.head)))
+    dynamics = _dynamics(platform)
+    machine.lag = mat65(*np.concatenate([lag_transition(d, dt) for d in dynamics]).ravel())
+    machine.has_lag = int(any(d.natural_frequency is not None for d in dynamics))
+    machine.dead_steps = wp.vec3i(*dead_steps(platform, dt))
+    machine.has_dead_time = int(any(dead_steps(platform, dt)))
+    return machine

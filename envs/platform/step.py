@@ -1,0 +1,264 @@
+"""One step of the machine: nine accelerations in, the true motion out.
+
+    command -> limited set-point -> dead time -> lag -> true motion
+
+The set-point starts each step where limiting left it, so a command never winds up. Carriage and
+turntable are limited axis by axis. A hexapod command is followed exactly where every leg may; else each
+leg goes as far towards it as its limits allow and the platform goes where forward kinematics says.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ..precision import real, vec2, vec3, vec6, vec9
+from .actuators import lag, subsystem
+from .hexapod import (
+    forward_kinematics,
+    leg_extensions,
+    leg_jacobian,
+    leg_rates,
+    manipulability,
+    platform_rates,
+)
+from .limiter import active_limit, is_safe, rate_bounds
+from .state import Machine, Motion, SetPoint, Step
+
+SLOW = wp.constant(real(0.1))
+"""Share of its speed limit at which a leg may move in a nearly singular pose."""
+
+
+@wp.func
+def bounds_of(m: Machine, start: Motion, i: int, dt: real) -> vec2:
+    """:func:`rate_bounds` of actuator ``i``."""
+    return rate_bounds(
+        start.position[i],
+        start.rate[i],
+        m.position_min[i],
+        m.position_max[i],
+        m.velocity[i],
+        m.acceleration[i],
+        dt,
+    )
+
+
+@wp.func
+def limit_flag(m: Machine, start: Motion, i: int, asked: real, dt: real) -> wp.uint64:
+    """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask."""
+    code = active_limit(
+        asked,
+        start.position[i],
+        start.rate[i],
+        m.position_min[i],
+        m.position_max[i],
+        m.velocity[i],
+        m.acceleration[i],
+        dt,
+    )
+    return wp.lshift(wp.uint64(code), wp.uint64(4 * i))
+
+
+@wp.func
+def limited_rate(m: Machine, start: Motion, i: int, asked: real, dt: real) -> real:
+    """Speed of actuator ``i`` nearest the one asked for that keeps its limits."""
+    bounds = bounds_of(m, start, i, dt)
+    return wp.min(wp.max(asked, bounds[0]), bounds[1])
+
+
+@wp.func
+def legs_may_follow(m: Machine, start: Motion, extensions: vec6, rates: vec6, dt: real) -> bool:
+    """Whether every leg can be at these extensions and rates after the step, and stop in time thereafter."""
+    may = bool(True)
+    for i in range(6):
+        bounds = bounds_of(m, start, i + 2, dt)
+        if rates[i] < bounds[0] or rates[i] > bounds[1]:
+            may = False
+        if not is_safe(
+            extensions[i], rates[i], m.position_min[i + 2], m.position_max[i + 2], m.acceleration[i + 2], dt
+        ):
+            may = False
+    return may
+
+
+@wp.func
+def keeps_clear(m: Machine, start: Motion, displacement: vec3, beta: vec3, rates: vec6) -> bool:
+    """Whether a pose is far from singular, or slowly leads away from one."""
+    now = manipulability(leg_jacobian(m.geometry, displacement, beta))
+    if now >= m.singularity_guard:
+        return True
+    slow = bool(True)
+    for i in range(6):
+        if wp.abs(rates[i]) > SLOW * m.velocity[i + 2]:
+            slow = False
+    before = manipulability(leg_jacobian(m.geometry, start.displacement, start.beta))
+    return slow and now >= before
+
+
+@wp.func
+def with_legs(motion: Motion, extensions: vec6, rates: vec6) -> Motion:
+    """A motion with its legs replaced."""
+    after = motion
+    position = motion.position
+    rate = motion.rate
+    for i in range(6):
+        position[i + 2] = extensions[i]
+        rate[i + 2] = rates[i]
+    after.position = position
+    after.rate = rate
+    return after
+
+
+@wp.func
+def with_pose(motion: Motion, pose: vec6, pose_rate: vec6) -> Motion:
+    """A motion with the platform's pose replaced."""
+    after = motion
+    after.displacement = vec3(pose[0], pose[1], pose[2])
+    after.beta = vec3(pose[3], pose[4], pose[5])
+    after.velocity = vec3(pose_rate[0], pose_rate[1], pose_rate[2])
+    after.beta_rate = vec3(pose_rate[3], pose_rate[4], pose_rate[5])
+    return after
+
+
+@wp.func
+def pose_from_legs(m: Machine, motion: Motion, guess: Motion) -> Motion:
+    """The motion whose pose and rates follow from its legs, by forward kinematics from a neighbouring one."""
+    extensions = vec6()
+    rates = vec6()
+    for i in range(6):
+        extensions[i] = motion.position[i + 2]
+        rates[i] = motion.rate[i + 2]
+    pose = forward_kinematics(m.geometry, extensions, guess.displacement, guess.beta)
+    beta = vec3(pose[3], pose[4], pose[5])
+    jacobian = leg_jacobian(m.geometry, vec3(pose[0], pose[1], pose[2]), beta)
+    return with_pose(motion, pose, platform_rates(jacobian, beta, rates))
+
+
+@wp.func
+def legs_towards(m: Machine, start: Motion, target: Motion, rates: vec6, dt: real) -> Motion:
+    """``target`` with each leg brought as near to its rate as its limits allow, and the pose that follows."""
+    extensions = vec6()
+    limited = vec6()
+    for i in range(6):
+        limited[i] = limited_rate(m, start, i + 2, rates[i], dt)
+        extensions[i] = start.position[i + 2] + real(0.5) * dt * (start.rate[i + 2] + limited[i])
+    return pose_from_legs(m, with_legs(target, extensions, limited), start)
+
+
+@wp.func
+def limited_legs(m: Machine, start: Motion, target: Motion, rates: vec6, dt: real) -> Motion:
+    """Legs towards their asked rates, or braking to rest where that would lead into a singular pose."""
+    moved = legs_towards(m, start, target, rates, dt)
+    reached = vec6()
+    for i in range(6):
+        reached[i] = moved.rate[i + 2]
+    if keeps_clear(m, start, moved.displacement, moved.beta, reached):
+        return moved
+    return legs_towards(m, start, target, vec6(), dt)
+
+
+@wp.func
+def limit_axes(m: Machine, start: Motion, action: vec9, dt: real) -> Motion:
+    """Carriage and turntable after the step, each within its own limits; the hexapod as it was."""
+    after = start
+    position = start.position
+    rate = start.rate
+    for i in range(9):
+        if i < 2 or i == 8:
+            rate[i] = limited_rate(m, start, i, start.rate[i] + action[i] * dt, dt)
+            position[i] = start.position[i] + real(0.5) * dt * (start.rate[i] + rate[i])
+    after.position = position
+    after.rate = rate
+    return after
+
+
+@wp.func
+def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
+    """The set-point after a step with nine accelerations, within all limits."""
+    half = real(0.5) * dt
+    linear = vec3(action[2], action[3], action[4])
+    angular = vec3(action[5], action[6], action[7])
+    velocity = start.velocity + linear * dt
+    beta_rate = start.beta_rate + angular * dt
+    displacement = start.displacement + (start.velocity + velocity) * half
+    beta = start.beta + (start.beta_rate + beta_rate) * half
+
+    after = limit_axes(m, start, action, dt)
+    extensions = leg_extensions(m.geometry, displacement, beta)
+    rates = leg_rates(leg_jacobian(m.geometry, displacement, beta), velocity, beta, beta_rate)
+    clear = keeps_clear(m, start, displacement, beta, rates)
+    mask = command_limits(m, start, action, rates, clear, dt)
+    if legs_may_follow(m, start, extensions, rates, dt) and clear:
+        after = with_legs(after, extensions, rates)
+        after.displacement = displacement
+        after.velocity = velocity
+        after.beta = beta
+        after.beta_rate = beta_rate
+    else:
+        after = limited_legs(m, start, after, rates, dt)
+
+    result = Step()
+    result.motion = after
+    result.limits = mask
+    return result
+
+
+@wp.func
+def command_limits(
+    m: Machine, start: Motion, action: vec9, leg_rates_asked: vec6, clear: bool, dt: real
+) -> wp.uint64:
+    """Which limits a command meets, as :class:`Step`'s mask."""
+    mask = wp.uint64(0)
+    for i in range(9):
+        asked = start.rate[i] + action[i] * dt
+        if i >= 2 and i < 8:
+            asked = leg_rates_asked[i - 2]
+            if not clear:
+                mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
+        mask = mask | limit_flag(m, start, i, asked, dt)
+    return mask
+
+
+@wp.func
+def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
+    """Accelerations of the nine degrees of freedom over a step, in the order of AXES."""
+    linear = (after.velocity - before.velocity) / dt
+    angular = (after.beta_rate - before.beta_rate) / dt
+    return vec9(
+        (after.rate[0] - before.rate[0]) / dt,
+        (after.rate[1] - before.rate[1]) / dt,
+        linear[0],
+        linear[1],
+        linear[2],
+        angular[0],
+        angular[1],
+        angular[2],
+        (after.rate[8] - before.rate[8]) / dt,
+    )
+
+
+@wp.func
+def actuate(
+    m: Machine, motion: Motion, delay: wp.array2d(dtype=SetPoint), environment: int, setpoint: Motion, dt: real
+) -> Motion:
+    """The true motion after a step: the set-point after dead time and lag.
+
+    ``delay[environment, k]`` is the set-point k + 1 steps before ``setpoint``.
+    """
+    if m.has_lag == 0 and m.has_dead_time == 0:
+        return setpoint
+    after = motion
+    position = motion.position
+    rate = motion.rate
+    for i in range(9):
+        steps = m.dead_steps[subsystem(i)]
+        begin = delay[environment, steps]
+        ending = setpoint.rate[i]
+        if steps > 0:
+            later = delay[environment, steps - 1]
+            ending = later.rate[i]
+        lagged = lag(m, i, motion.position[i], motion.rate[i], begin.position[i], begin.rate[i], ending, dt)
+        position[i] = lagged[0]
+        rate[i] = lagged[1]
+    after.position = position
+    after.rate = rate
+    return pose_from_legs(m, after, motion)

@@ -1,0 +1,183 @@
+"""The step of one environment: machine, cues and perception. One definition serves every kernel.
+
+car cue -> policy -> **machine -> cues felt -> sensed**
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from .perception.filters import Vestibular, advance_vestibular, rested, sense
+from .platform.cab import cab_angular_velocity, specific_force
+from .platform.hexapod import leg_extensions
+from .platform.state import Machine, Motion, SetPoint
+from .platform.step import actuate, command, mean_acceleration
+from .precision import real, vec3, vec9
+from .state import Cues, Drives, State
+
+
+@wp.func
+def wanted_cues(drives: Drives, drive: int, sample: int) -> Cues:
+    """The car's cues at a sample of a drive; its last one after the end."""
+    i = drives.first[drive] + wp.min(sample, drives.length[drive] - 1)
+    cues = Cues()
+    cues.force = drives.force[i]
+    cues.rate = drives.rate[i]
+    cues.head_force = drives.head_force[i]
+    return cues
+
+
+@wp.func
+def felt_cues(m: Machine, motion: Motion, acceleration: vec9) -> Cues:
+    """The cues of the true motion, Eqs. (1), (7), (40), at the cab's reference point and at the head."""
+    origin = vec3(acceleration[0] + acceleration[2], acceleration[1] + acceleration[3], acceleration[4])
+    beta_acceleration = vec3(acceleration[5], acceleration[6], acceleration[7])
+    psi_t = motion.position[8]
+    omega_t = motion.rate[8]
+    cues = Cues()
+    cues.force = specific_force(
+        m.cab, motion.beta, motion.beta_rate, beta_acceleration, psi_t, omega_t, acceleration[8], origin
+    )
+    cues.head_force = specific_force(
+        m.head, motion.beta, motion.beta_rate, beta_acceleration, psi_t, omega_t, acceleration[8], origin
+    )
+    cues.rate = cab_angular_velocity(motion.beta, motion.beta_rate, psi_t, omega_t)
+    return cues
+
+
+@wp.func
+def rest_motion(m: Machine, start: vec9) -> Motion:
+    """The machine at rest: carriage x, y; hexapod displacement and Euler angles; turntable angle."""
+    motion = Motion()
+    motion.displacement = vec3(start[2], start[3], start[4])
+    motion.beta = vec3(start[5], start[6], start[7])
+    legs = leg_extensions(m.geometry, motion.displacement, motion.beta)
+    motion.position = vec9(
+        start[0], start[1], legs[0], legs[1], legs[2], legs[3], legs[4], legs[5], start[8]
+    )
+    return motion
+
+
+@wp.func
+def initial_state(
+    m: Machine, v: Vestibular, drives: Drives, drive: int, sample: int, start: vec9
+) -> State:
+    """The machine at rest at ``start``, the driver at rest in it, the car at a sample of its drive."""
+    state = State()
+    state.sample = sample
+    state.motion = rest_motion(m, start)
+    state.setpoint = state.motion
+    state.wanted = wanted_cues(drives, drive, sample)
+    state.felt = felt_cues(m, state.motion, vec9())
+    state.vestibular_wanted = rested(v, state.wanted.head_force, state.wanted.rate)
+    state.vestibular_felt = rested(v, state.felt.head_force, state.felt.rate)
+    state.sensed_wanted = sense(v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate)
+    state.sensed_felt = sense(v, state.vestibular_felt, state.felt.head_force, state.felt.rate)
+    return state
+
+
+@wp.func
+def next_state(
+    m: Machine,
+    v: Vestibular,
+    drives: Drives,
+    drive: int,
+    delay: wp.array2d(dtype=SetPoint),
+    environment: int,
+    state: State,
+    action: vec9,
+    dt: real,
+) -> State:
+    """One step of one environment with nine accelerations."""
+    commanded = command(m, state.setpoint, action, dt)
+    motion = actuate(m, state.motion, delay, environment, commanded.motion, dt)
+    acceleration = mean_acceleration(state.motion, motion, dt)
+
+    after = State()
+    after.sample = state.sample + 1
+    after.setpoint = commanded.motion
+    after.limits = commanded.limits
+    after.motion = motion
+    after.acceleration = acceleration
+    after.wanted = wanted_cues(drives, drive, after.sample)
+    after.felt = felt_cues(m, motion, acceleration)
+    after.vestibular_wanted = advance_vestibular(
+        v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate
+    )
+    after.vestibular_felt = advance_vestibular(
+        v, state.vestibular_felt, state.felt.head_force, state.felt.rate
+    )
+    after.sensed_wanted = sense(v, after.vestibular_wanted, after.wanted.head_force, after.wanted.rate)
+    after.sensed_felt = sense(v, after.vestibular_felt, after.felt.head_force, after.felt.rate)
+    return after
+
+
+@wp.func
+def shift_delay(
+    delay: wp.array2d(dtype=SetPoint),
+    delay_out: wp.array2d(dtype=SetPoint),
+    environment: int,
+    setpoint: Motion,
+) -> int:
+    """Put the newest set-point before the earlier ones."""
+    newest = SetPoint()
+    newest.position = setpoint.position
+    newest.rate = setpoint.rate
+    delay_out[environment, 0] = newest
+    for k in range(1, delay.shape[1]):
+        delay_out[environment, k] = delay[environment, k - 1]
+    return 0
+
+
+def step_kernel(
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    dt: real,
+    state: wp.array(dtype=State),
+    delay: wp.array2d(dtype=SetPoint),
+    action: wp.array(dtype=vec9),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+) -> None:
+    """One step of every environment, out of place."""
+    i = wp.tid()
+    m = machines[machine_of[i]]
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, state[i], action[i], dt)
+    if m.has_lag != 0 or m.has_dead_time != 0:
+        shift_delay(delay, delay_out, i, after.setpoint)
+    state_out[i] = after
+
+
+def reset_kernel(
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    sample: wp.array(dtype=int),
+    start: wp.array(dtype=vec9),
+    mask: wp.array(dtype=wp.bool),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+) -> None:
+    """Put the masked environments at rest at their start poses."""
+    i = wp.tid()
+    if not mask[i]:
+        return
+    m = machines[machine_of[i]]
+    state = initial_state(m, vestibular[0], drives, drive_of[i], sample[i], start[i])
+    state_out[i] = state
+    newest = SetPoint()
+    newest.position = state.setpoint.position
+    for k in range(delay_out.shape[1]):
+        delay_out[i, k] = newest
+
+
+step_forward = wp.kernel(step_kernel, enable_backward=False, module="unique")
+"""The step without its adjoint: compiles in seconds."""
+
+reset_forward = wp.kernel(reset_kernel, enable_backward=False, module="unique")
+"""The reset."""
