@@ -1,0 +1,158 @@
+"""The figure of a maneuver: cues of car and simulator, tilt, travel, legs and limits, for each policy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from .criteria import Criteria
+from .figure_style import CAR, LIMIT, limit_lines, line_styles, new_figure, png, styled
+from .metrics import AXES, cab_motion, cue_error, tilt_rate
+from .trajectory import ACTUATORS, Floats, Trajectory
+
+_CUES = (
+    ("Specific force x (surge)", "m/s²", 1.0),
+    ("Specific force y (sway)", "m/s²", 1.0),
+    ("Specific force z + g (heave)", "m/s²", 1.0),
+    ("Roll rate", "deg/s", np.degrees(1.0)),
+    ("Pitch rate", "deg/s", np.degrees(1.0)),
+    ("Yaw rate", "deg/s", np.degrees(1.0)),
+)
+_LEGS = slice(2, 8)
+
+Drives = Mapping[str, Trajectory]
+Styles = Mapping[str, Mapping[str, Any]]
+
+
+def maneuver_figure(
+    drives: Drives, policies: list[str] | None = None, criteria: Criteria | None = None
+) -> bytes:
+    """A PNG that shows the trajectories of one maneuver.
+
+    Args:
+        drives: Trajectory of each policy (at least one), all of the same cues.
+        policies: All policies of the evaluation, so that each keeps its colour from figure to figure.
+        criteria: Thresholds to draw.
+    """
+    criteria = criteria or Criteria()
+    styles = line_styles(policies or list(drives))
+    with styled():
+        figure = new_figure(13.0, 14.0)
+        grid = figure.subplots(5, 3, sharex=True)
+        for i, axes in enumerate(grid[:2].flat):
+            _cue(axes, drives, styles, i)
+        _tilt(grid[2], drives, styles, criteria)
+        _travel(grid[3], drives, styles)
+        _legs(grid[4, 0], drives, styles)
+        _limit_activity(grid[4, 1], drives, styles)
+        _error(grid[4, 2], drives, styles, criteria)
+        for axes in grid[-1]:
+            axes.set_xlabel("time (s)")
+        first = next(iter(drives.values()))
+        figure.suptitle(
+            f"{first.maneuver}: {first.car} car on {first.platform}", fontsize=13, x=0.01, ha="left"
+        )
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=7, fontsize=9)
+        return png(figure)
+
+
+def _label(axes: Axes, title: str, unit: str) -> None:
+    axes.set_title(title)
+    axes.set_ylabel(unit)
+    axes.margins(x=0.0)
+
+
+def _cue(axes: Axes, drives: Drives, styles: Styles, i: int) -> None:
+    title, unit, factor = _CUES[i]
+    for name, drive in drives.items():
+        axes.plot(drive.time, factor * cab_motion(drive)[1][:, i], label=name, **styles[name])
+    car = next(iter(drives.values()))
+    axes.plot(car.time, factor * cab_motion(car)[0][:, i], color=CAR, linewidth=1.6, label="car", zorder=1.9)
+    _widen(axes, 1.0 if AXES[i].startswith("f") else 5.0)
+    _label(axes, title, unit)
+
+
+def _widen(axes: Axes, least: float) -> None:
+    """Keep at least this range in view, so that rounding or tiny motion does not fill a panel."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+
+
+def _tilt(row: Any, drives: Drives, styles: Styles, criteria: Criteria) -> None:
+    def curves(
+        axes: Axes, title: str, unit: str, signal: Callable[[Trajectory], Floats], least: float
+    ) -> None:
+        for name, drive in drives.items():
+            axes.plot(drive.time, np.degrees(signal(drive)), **styles[name])
+        _widen(axes, least)
+        _label(axes, title, unit)
+
+    curves(row[0], "Hexapod roll", "deg", lambda drive: drive.hexapod[:, 3], 2.0)
+    curves(row[1], "Hexapod pitch", "deg", lambda drive: drive.hexapod[:, 4], 2.0)
+    curves(row[2], "Tilt rate beyond the car's own", "deg/s", tilt_rate, 0.0)
+    row[2].set_ylim(0.0, max(row[2].get_ylim()[1], 1.3 * np.degrees(criteria.tilt_rate)))
+    row[2].axhline(np.degrees(criteria.tilt_rate), color=LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
+
+
+def _travel(row: Any, drives: Drives, styles: Styles) -> None:
+    for axes, i, title, unit in (
+        (row[0], 0, "Carriage x", "m"),
+        (row[1], 1, "Carriage y", "m"),
+        (row[2], 8, "Turntable", "deg"),
+    ):
+        factor = np.degrees(1.0) if unit == "deg" else 1.0
+        for name, drive in drives.items():
+            axes.plot(drive.time, factor * drive.positions[:, i], **styles[name])
+        _widen(axes, 0.5 * factor)
+        _limits(axes, drives, slice(i, i + 1), factor, unit)
+        _label(axes, title, unit)
+
+
+def _legs(axes: Axes, drives: Drives, styles: Styles) -> None:
+    for name, drive in drives.items():
+        colour = styles[name]["color"]
+        lowest, highest = drive.legs.min(axis=1), drive.legs.max(axis=1)
+        axes.fill_between(drive.time, lowest, highest, color=colour, alpha=0.18, linewidth=0.0)
+        axes.plot(drive.time, lowest, drive.time, highest, **{**styles[name], "linewidth": 0.9})
+    _widen(axes, 0.1)
+    _limits(axes, drives, _LEGS, 1.0, "m")
+    _label(axes, "Legs, shortest to longest of the six", "m from neutral")
+
+
+def _limits(axes: Axes, drives: Drives, actuators: slice, factor: float, unit: str) -> None:
+    """Limits of actuators that share them, if there are any."""
+    table = next(iter(drives.values())).limits
+    low, high = table.position_min[actuators].max(), table.position_max[actuators].min()
+    if not (np.isfinite(low) and np.isfinite(high) and low < 0.0 < high):
+        return
+    positions = [drive.positions[:, actuators] for drive in drives.values()]
+    used = max(float(max(p.max() / high, p.min() / low)) for p in positions)
+    limit_lines(axes, factor * low, factor * high, used, unit)
+
+
+def _limit_activity(axes: Axes, drives: Drives, styles: Styles) -> None:
+    """For each policy the number of actuators at a limit."""
+    for name, drive in drives.items():
+        axes.plot(
+            drive.time, np.count_nonzero(drive.limits_active, axis=1), **styles[name], drawstyle="steps-post"
+        )
+    axes.set_ylim(-0.2, len(ACTUATORS) + 0.2)
+    axes.set_yticks(range(0, len(ACTUATORS) + 1, 3))
+    _label(axes, "Actuators at a limit", f"of {len(ACTUATORS)}")
+
+
+def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> None:
+    """The cue error gathered so far; its last value is J."""
+    for name, drive in drives.items():
+        error = np.cumsum(cue_error(*cab_motion(drive), criteria)) / len(drive)
+        axes.plot(drive.time, error, **styles[name])
+        axes.annotate(
+            f" {error[-1]:.2f}", (drive.time[-1], error[-1]), color=styles[name]["color"], fontsize=8
+        )
+    axes.set_ylim(bottom=0.0)
+    _label(axes, "Cue error up to now (ends at J)", "J")
