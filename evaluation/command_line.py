@@ -1,0 +1,157 @@
+"""The command ``motion-cueing``: a subcommand is a dataclass of arguments and a ``run`` in its own module."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import os
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stderr
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Final
+
+from ..envs.errors import ConfigurationError, MotionCueingError, UnknownNameError
+
+PROGRAM: Final = "motion-cueing"
+SUCCESS: Final = 0
+FAILURE: Final = 1
+BAD_ARGUMENTS: Final = 2
+INTERRUPTED: Final = 130
+"""128 + SIGINT, as shells report it."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A subcommand; its module is imported only when it is called.
+
+    Args:
+        module: Relative to this package.
+        arguments: Name of the dataclass in it that tyro turns into options.
+        summary: One line for the overview.
+    """
+
+    module: str
+    arguments: str
+    summary: str
+
+
+COMMANDS: Final[Mapping[str, Command]] = {
+    "evaluate": Command(
+        ".evaluate_command", "EvaluateCommand", "drive maneuvers with policies and compare them"
+    ),
+    "list": Command(
+        ".list_command", "ListCommand", "show the names of policies, maneuvers, motion bases and cars"
+    ),
+    "import": Command(".import_command", "ImportCommand", "turn a log of a drive into cues"),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: Arguments without the program's name; those of the process if not given.
+
+    Returns:
+        0 success, 1 a failure while working, 2 bad arguments, 130 interrupted.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    name = next((argument for argument in arguments[:1] if not argument.startswith("-")), "")
+    return _guarded(f"{PROGRAM} {name}".strip(), lambda: _dispatch(arguments))
+
+
+def _guarded(program: str, work: Callable[[], int]) -> int:
+    """Turn what can go wrong into one line and an exit status."""
+    try:
+        return work()
+    except MotionCueingError as error:
+        return _complain(program, str(error), BAD_ARGUMENTS)
+    except KeyboardInterrupt:
+        return _complain(program, "interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader (`head`) has gone; keep Python from complaining again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILURE
+    except OSError as error:
+        return _complain(program, f"{error.filename or 'output'}: {error.strerror or error}", FAILURE)
+
+
+def _complain(program: str, message: str, status: int) -> int:
+    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    return status
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(overview())
+        return SUCCESS if arguments else BAD_ARGUMENTS
+    if arguments[0] == "--version":
+        from .provenance import package_version
+
+        print(f"{PROGRAM} {package_version()}")
+        return SUCCESS
+    name, rest = arguments[0], arguments[1:]
+    if name not in COMMANDS:
+        raise UnknownNameError("command", name, COMMANDS)
+    command = COMMANDS[name]
+    module = import_module(command.module, __package__)
+    parsed = _parse(name, getattr(module, command.arguments), rest)
+    return parsed if isinstance(parsed, int) else int(module.run(parsed))
+
+
+def overview() -> str:
+    """The help of the command without a subcommand."""
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {command.summary}" for name, command in COMMANDS.items()]
+    return "\n".join(
+        [
+            f"usage: {PROGRAM} COMMAND [options]",
+            "",
+            "Motion cueing for driving simulators.",
+            "",
+            "commands:",
+            *lines,
+            "",
+            f"`{PROGRAM} COMMAND --help` shows the options of a command, `{PROGRAM} --version` the version.",
+        ]
+    )
+
+
+def _parse(name: str, arguments: type[Any], rest: list[str]) -> Any:
+    """The dataclass filled from the arguments, or the exit status after ``--help``."""
+    import tyro
+
+    _refuse_repeated(arguments, rest)
+    complaint = io.StringIO()
+    try:
+        with redirect_stderr(complaint):
+            return tyro.cli(arguments, prog=f"{PROGRAM} {name}", args=rest)
+    except SystemExit as stop:
+        if not stop.code:
+            return SUCCESS
+        raise ConfigurationError(_one_line(name, complaint.getvalue())) from None
+
+
+def _one_line(name: str, panel: str) -> str:
+    """The sentences of tyro's framed complaint, with the names of the options it suggests."""
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", panel)
+    rows = [row.strip("│╭╮╰╯─ ").strip() for row in plain.splitlines()[1:]]
+    text = " ".join(row for row in rows if row).split("For full helptext")[0]
+    told, _, suggested = text.partition("Perhaps you meant:")
+    near = dict.fromkeys(re.findall(r"(?<!\S)--[a-z][a-z-]*", suggested))
+    hint = f" Did you mean {' or '.join(near)}?" if near else ""
+    return f"{told.strip().rstrip('.')}.{hint} See `{PROGRAM} {name} --help`"
+
+
+def _refuse_repeated(arguments: type[Any], rest: list[str]) -> None:
+    """Tyro keeps only the last of repeated lists: say so instead of dropping names."""
+    for option in dataclasses.fields(arguments):
+        flag = "--" + option.name.replace("_", "-")
+        times = sum(word == flag or word.startswith(flag + "=") for word in rest)
+        if times > 1 and "Append" not in str(option.type):
+            raise ConfigurationError(
+                f"{flag} is given {times} times; give it once, with all its values after it"
+            )

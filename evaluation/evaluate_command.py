@@ -1,0 +1,224 @@
+"""``motion-cueing evaluate``: every policy on every maneuver, with tables, figures and a report."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from tyro.conf import FlagCreatePairsOff, arg
+
+from ..envs.cues import CueTrace
+from ..envs.errors import ConfigurationError, DataError
+from ..envs.settings import to_dict
+from ..envs.storage import write_bytes
+from .figures import maneuver_figure
+from .provenance import provenance
+from .report import save_report
+from .results import Results
+from .selection import ALL, find_car, find_maneuvers, find_platform, find_policies
+from .suite import CueSource, Drive, Outcome, run_suite
+from .tables import print_results
+from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..envs.car import Car
+    from ..envs.platform import Platform
+
+_PLAIN_WIDTH: Final = 160
+"""Columns of the tables where the output is no terminal."""
+
+Name = Annotated[str, arg(metavar="NAME|FILE")]
+Names = Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
+Folder = Annotated[Path, arg(metavar="DIR")]
+
+
+@dataclass(frozen=True)
+class EvaluateCommand:
+    """Drive maneuvers with policies, and say which policy is better, by how much, and why.
+
+    Writes results.json, results.csv, report.html, one figure a maneuver, and every trajectory.
+    `motion-cueing list` shows all names.
+    """
+
+    policy: Names = ()
+    """Policies, by name or file; without it, the ones meant for comparison."""
+    maneuver: Names = (ALL,)
+    """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
+    platform: Name = "paper"
+    """Motion base, by name or YAML file."""
+    car: Name = "sedan"
+    """Car, by name or YAML file."""
+    out: Folder = Path("results")
+    """Folder for everything that is written; made if missing."""
+    paper: Annotated[bool, FlagCreatePairsOff] = False
+    """Make the six cases and the figures of the paper instead, with a pass or a fail for each number."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a command asks for, all names resolved.
+
+    Args:
+        maneuvers: Sources of cues by label.
+        policies: Drives by label.
+        platform: The motion base.
+        car: The car.
+        out: Folder of the output.
+        arguments: The command line that asks for it.
+    """
+
+    maneuvers: Mapping[str, CueSource]
+    policies: Mapping[str, Drive]
+    platform: Platform
+    car: Car
+    out: Path
+    arguments: tuple[str, ...]
+
+
+@dataclass(eq=False)
+class _Output:
+    """Writes what belongs to one maneuver as soon as it is driven; keeps the figures for the report."""
+
+    folder: Path
+    policies: list[str]
+    figures: dict[str, bytes] = field(default_factory=dict)
+
+    def finish(self, maneuver: str, drives: Mapping[str, Trajectory]) -> None:
+        """Save trajectories and figure of a maneuver."""
+        for policy, drive in drives.items():
+            drive.save(self.folder / "trajectories" / f"{file_name(maneuver)}--{file_name(policy)}.npz")
+        self.figures[maneuver] = maneuver_figure(drives, self.policies)
+        write_bytes(self.folder / f"{file_name(maneuver)}.png", self.figures[maneuver])
+
+
+def run(command: EvaluateCommand) -> int:
+    """Evaluate; the exit status is 1 if a drive failed.
+
+    Raises:
+        MotionCueingError: an argument is wrong.
+    """
+    if command.paper:
+        return _run_paper(command)
+    plan = make_plan(command)
+    results, figures = evaluate(plan)
+    save(results, figures, plan.out)
+    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
+    print_results(console, results)
+    console.print(
+        f"Everything is in {plan.out}; open {plan.out / 'report.html'}", highlight=False, markup=False
+    )
+    return 1 if results.failures else 0
+
+
+def make_plan(command: EvaluateCommand) -> Plan:
+    """Resolve every name of a command before anything is driven.
+
+    Raises:
+        UnknownNameError: a name is not registered.
+        ConfigurationError: a YAML file has a wrong field.
+        DataError: a file is missing or broken.
+    """
+    if not command.maneuver:
+        raise ConfigurationError("--maneuver needs at least one name; `all` stands for every maneuver")
+    if command.out.exists() and not command.out.is_dir():
+        raise DataError(f"--out {command.out} is a file; name a folder")
+    platform, car = find_platform(command.platform), find_car(command.car)
+    policies = find_policies(command.policy)
+    return Plan(
+        maneuvers=find_maneuvers(command.maneuver, car),
+        policies={label: _drive_with(name, platform, car) for label, name in policies.items()},
+        platform=platform,
+        car=car,
+        out=command.out,
+        arguments=command_line(command),
+    )
+
+
+def command_line(command: EvaluateCommand) -> tuple[str, ...]:
+    """The words that give this command: the options that differ from their default."""
+    words = ["motion-cueing", "evaluate"]
+    for option in fields(command):
+        value = getattr(command, option.name)
+        if value != option.default:
+            words += [
+                f"--{option.name}",
+                *([str(item) for item in value] if isinstance(value, tuple) else [str(value)]),
+            ]
+    return tuple(words)
+
+
+def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
+    """Drive and measure everything; figures by maneuver come beside the results."""
+    output = _Output(plan.out, list(plan.policies))
+    with _progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
+        outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance)
+    return collect(plan, outcome), output.figures
+
+
+def collect(plan: Plan, outcome: Outcome) -> Results:
+    """The results of an outcome, with what made them."""
+    origin = provenance(
+        plan.arguments,
+        (plan.platform.name, to_dict(plan.platform)),
+        (plan.car.name, to_dict(plan.car)),
+        outcome.metadata,
+    )
+    return Results.of(outcome.maneuvers, outcome.failures, origin)
+
+
+def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
+    """Write results.json, results.csv and report.html into a folder."""
+    results.save_json(folder / "results.json")
+    results.save_csv(folder / "results.csv")
+    save_report(results, figures, folder / "report.html")
+
+
+def file_name(label: str) -> str:
+    """A label as part of a file name."""
+    return re.sub(r"[^\w.+-]+", "_", label)
+
+
+def _drive_with(name: str, platform: Platform, car: Car) -> Drive:
+    from ..baselines import make_policy
+    from .rollout import rollout
+
+    policy = make_policy(name, platform)
+
+    def drive(cues: CueTrace) -> Trajectory:
+        return rollout(policy, cues, platform=platform, car=car)
+
+    return drive
+
+
+def _run_paper(command: EvaluateCommand) -> int:
+    own = replace(command, paper=False, out=EvaluateCommand().out)
+    if own != EvaluateCommand():
+        raise ConfigurationError(
+            "--paper has its own cases; leave --policy, --maneuver, --platform and --car out"
+        )
+    from .paper import run as run_paper
+
+    return run_paper(command.out)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[str, str], None]]:
+    """A bar on the terminal's error stream, so that the tables can be piped."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=total)
+        started = 0
+
+        def advance(maneuver: str, policy: str) -> None:
+            nonlocal started
+            bar.update(task, description=f"{maneuver}: {policy}", completed=started)
+            started += 1
+
+        yield advance
