@@ -206,7 +206,9 @@ class Simulator:
         if values.shape != (self.n, N_AXES) and not (self.n == 1 and values.shape == (N_AXES,)):
             raise ActionError(f"action has shape {values.shape}, expected ({self.n}, {N_AXES})")
         if not np.isfinite(values).all():
-            raise ActionError(f"action is not finite: {values[~np.isfinite(values)][:3]} among its accelerations")
+            raise ActionError(
+                f"action is not finite: {values[~np.isfinite(values)][:3]} among its accelerations"
+            )
         if self._action_view is not None:
             self._action_view[...] = values
         else:
@@ -228,7 +230,9 @@ def upload_drives(drives: Sequence[CueTrace], platform: Platform, dt: float, dev
     """
     for drive in drives:
         if abs(drive.dt - dt) > 1e-6 * dt:
-            raise DataError(f"{drive.name}: time step is {drive.dt:.6g} s, expected {dt:.6g} s; use resampled({dt})")
+            raise DataError(
+                f"{drive.name}: time step is {drive.dt:.6g} s, expected {dt:.6g} s; use resampled({dt})"
+            )
     uploaded: Any = Drives()
     fields = {
         "force": [drive.specific_force for drive in drives],
@@ -247,9 +251,7 @@ def _structs(kind: Any, values: Sequence[Any], device: Any) -> Any:
     return wp.array(list(values), dtype=kind, device=device)
 
 
-def _indices(
-    name: str, values: ArrayLike | None, default: NDArray[Any], count: int
-) -> NDArray[np.int32]:
+def _indices(name: str, values: ArrayLike | None, default: NDArray[Any], count: int) -> NDArray[np.int32]:
     chosen = np.asarray(default if values is None else values, dtype=np.int32)
     if chosen.ndim != 1 or len(chosen) == 0 or chosen.min() < 0 or chosen.max() >= count:
         raise ConfigurationError(f"{name} must hold indices from 0 to {count - 1}, found {values!r}")

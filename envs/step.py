@@ -52,16 +52,12 @@ def rest_motion(m: Machine, start: vec9) -> Motion:
     motion.displacement = vec3(start[2], start[3], start[4])
     motion.beta = vec3(start[5], start[6], start[7])
     legs = leg_extensions(m.geometry, motion.displacement, motion.beta)
-    motion.position = vec9(
-        start[0], start[1], legs[0], legs[1], legs[2], legs[3], legs[4], legs[5], start[8]
-    )
+    motion.position = vec9(start[0], start[1], legs[0], legs[1], legs[2], legs[3], legs[4], legs[5], start[8])
     return motion
 
 
 @wp.func
-def initial_state(
-    m: Machine, v: Vestibular, drives: Drives, drive: int, sample: int, start: vec9
-) -> State:
+def initial_state(m: Machine, v: Vestibular, drives: Drives, drive: int, sample: int, start: vec9) -> State:
     """The machine at rest at ``start``, the driver at rest in it, the car at a sample of its drive."""
     state = State()
     state.sample = sample

@@ -61,7 +61,9 @@ def subsystem(actuator: int) -> int:
 
 
 @wp.func
-def lag(m: Machine, actuator: int, y: real, y_rate: real, u: real, u_rate: real, u_next: real, dt: real) -> vec2:
+def lag(
+    m: Machine, actuator: int, y: real, y_rate: real, u: real, u_rate: real, u_next: real, dt: real
+) -> vec2:
     """Position and rate of a lagging actuator after a step in which its set-point's rate goes to ``u_next``."""
     row = 2 * subsystem(actuator)
     u_acceleration = (u_next - u_rate) / dt

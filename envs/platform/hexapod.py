@@ -90,10 +90,24 @@ def rotational_block(jacobian: Jacobian) -> mat33:
 
 
 @wp.func
-def manipulability(jacobian: Jacobian) -> real:
-    """det(J)^2 of the whole Jacobian: 0 in a singular pose."""
-    p = wp.transpose(jacobian.u) * jacobian.u
-    return wp.determinant(p) * wp.determinant(rotational_block(jacobian))
+def three_rows(m: mat63, first: int) -> mat33:
+    """Rows ``first`` to ``first`` + 2."""
+    i = first
+    return mat33(
+        m[i, 0], m[i, 1], m[i, 2],
+        m[i + 1, 0], m[i + 1, 1], m[i + 1, 2],
+        m[i + 2, 0], m[i + 2, 1], m[i + 2, 2],
+    )  # fmt: skip
+
+
+@wp.func
+def determinant(jacobian: Jacobian) -> real:
+    """det(J) of the whole Jacobian: 0 in a singular pose, where its sign changes."""
+    u_1 = three_rows(jacobian.u, 0)
+    schur = three_rows(jacobian.w, 3) - three_rows(jacobian.u, 3) * (
+        wp.inverse(u_1) * three_rows(jacobian.w, 0)
+    )
+    return wp.determinant(u_1) * wp.determinant(schur)
 
 
 @wp.func

@@ -57,7 +57,9 @@ def legs_of_pose(hexapod: Hexapod, pose: ArrayLike) -> NDArray[np.float64]:
     return _launch(_inverse, hexapod, _sixes("pose", pose))
 
 
-def pose_of_legs(hexapod: Hexapod, extensions: ArrayLike, guess: ArrayLike = (0.0,) * 6) -> NDArray[np.float64]:
+def pose_of_legs(
+    hexapod: Hexapod, extensions: ArrayLike, guess: ArrayLike = (0.0,) * 6
+) -> NDArray[np.float64]:
     """Poses (..., 6) with these leg extensions, m: forward kinematics by Newton iteration from ``guess``.
 
     Raises:

@@ -18,9 +18,6 @@ from .state import Machine
 UNLIMITED: Final = 1e9
 """Travel of an unlimited turntable in the kernels, rad: finite, so that no infinity meets a zero."""
 
-SINGULARITY_SHARE: Final = 0.1
-"""Share of the neutral pose's det(J) below which the hexapod is kept from moving on towards a singular pose."""
-
 _LEAST_CONDITION: Final = 1e-3
 """Least ratio of smallest to largest singular value of the neutral Jacobian (lengths over the joint radius)."""
 
@@ -111,9 +108,7 @@ def machine_parameters(platform: Platform, dt: float) -> Any:
     check_geometry(platform.hexapod)
     machine: Any = Machine()
     machine.geometry = geometry_of(platform.hexapod)
-    machine.singularity_guard = (
-        SINGULARITY_SHARE * np.linalg.det(neutral_jacobian(platform.hexapod))
-    ) ** 2
+    machine.neutral_determinant = float(np.linalg.det(neutral_jacobian(platform.hexapod)))
     for name, values in _limits(platform).items():
         setattr(machine, name, vec9(*values))
     cab = np.array(platform.cab.reference_point)

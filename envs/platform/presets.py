@@ -42,9 +42,7 @@ def joint_pairs(radius: float, spacing: float, first: float) -> Joints:
     return tuple((radius * math.cos(a), radius * math.sin(a), 0.0) for a in angles)
 
 
-def paired_hexapod(
-    upper: tuple[float, float], lower: tuple[float, float]
-) -> tuple[Joints, Joints]:
+def paired_hexapod(upper: tuple[float, float], lower: tuple[float, float]) -> tuple[Joints, Joints]:
     """Joints A_i and B_i of a hexapod given by radius and pair spacing above and below.
 
     Pairs above stand at 0, 120 and 240 degrees, pairs below between them; each leg joins neighbours.

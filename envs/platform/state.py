@@ -24,7 +24,7 @@ class Machine:
     """Constants of one machine. Actuator vectors are in the order of :data:`ACTUATORS`."""
 
     geometry: HexapodGeometry
-    singularity_guard: real  # least det(J)^2 at which the hexapod moves freely
+    neutral_determinant: real  # det(J) at neutral
     position_min: vec9  # m, m, 6 x m, rad
     position_max: vec9
     velocity: vec9  # m/s, rad/s

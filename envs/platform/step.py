@@ -14,18 +14,25 @@ import warp as wp
 from ..precision import real, vec2, vec3, vec6, vec9
 from .actuators import lag, subsystem
 from .hexapod import (
+    NEWTON_TOLERANCE,
+    determinant,
     forward_kinematics,
     leg_extensions,
     leg_jacobian,
     leg_rates,
-    manipulability,
     platform_rates,
 )
 from .limiter import active_limit, is_safe, rate_bounds
 from .state import Machine, Motion, SetPoint, Step
 
-SLOW = wp.constant(real(0.1))
-"""Share of its speed limit at which a leg may move in a nearly singular pose."""
+NEARLY_SINGULAR = wp.constant(real(0.15))
+"""Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
+
+FAR_FROM_SINGULAR = wp.constant(real(0.75))
+"""Clearance from which braking is taken not to lead to a singular pose."""
+
+NEIGHBOURHOOD = wp.constant(real(0.35))
+"""Largest change of an Euler angle while the legs brake, rad; more means that a singular pose lies between."""
 
 
 @wp.func
@@ -81,17 +88,51 @@ def legs_may_follow(m: Machine, start: Motion, extensions: vec6, rates: vec6, dt
 
 
 @wp.func
-def keeps_clear(m: Machine, start: Motion, displacement: vec3, beta: vec3, rates: vec6) -> bool:
-    """Whether a pose is far from singular, or slowly leads away from one."""
-    now = manipulability(leg_jacobian(m.geometry, displacement, beta))
-    if now >= m.singularity_guard:
+def clearance(m: Machine, displacement: vec3, beta: vec3) -> real:
+    """det(J) of a pose over that of neutral: 0 in a singular pose, negative behind it."""
+    return determinant(leg_jacobian(m.geometry, displacement, beta)) / m.neutral_determinant
+
+
+@wp.func
+def is_clear(m: Machine, pose: vec6, extensions: vec6, beta: vec3, least: real) -> bool:
+    """Whether a pose has these legs, is a neighbour of the one with ``beta``, and not nearly singular.
+
+    Behind a singular pose Newton's iteration finds no pose, or one far off. Comparisons with NaN are false.
+    """
+    displacement = vec3(pose[0], pose[1], pose[2])
+    angles = vec3(pose[3], pose[4], pose[5])
+    error = wp.max(wp.abs(leg_extensions(m.geometry, displacement, angles) - extensions))
+    closes = error <= real(10.0) * NEWTON_TOLERANCE
+    near = wp.max(wp.abs(angles - beta)) <= NEIGHBOURHOOD
+    return closes and near and clearance(m, displacement, angles) >= least
+
+
+@wp.func
+def keeps_clear(
+    m: Machine, start: Motion, displacement: vec3, beta: vec3, extensions: vec6, rates: vec6
+) -> bool:
+    """Whether the platform, braking from here, comes to rest in a pose that is not nearly singular.
+
+    While each leg brakes, the extensions it comes to rest at stay the same, so what holds now holds until
+    rest. In a nearly singular pose any motion that ends clearer than it began is allowed.
+    """
+    now = clearance(m, displacement, beta)
+    if now >= FAR_FROM_SINGULAR:
         return True
-    slow = bool(True)
+    least = wp.min(NEARLY_SINGULAR, clearance(m, start.displacement, start.beta))
+    if now < least:
+        return False
+    halfway = extensions
+    resting = extensions
     for i in range(6):
-        if wp.abs(rates[i]) > SLOW * m.velocity[i + 2]:
-            slow = False
-    before = manipulability(leg_jacobian(m.geometry, start.displacement, start.beta))
-    return slow and now >= before
+        way = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
+        halfway[i] = extensions[i] + real(0.5) * way
+        resting[i] = extensions[i] + way
+    middle = forward_kinematics(m.geometry, halfway, displacement, beta)
+    rest = forward_kinematics(
+        m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
+    )
+    return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
 
 
 @wp.func
@@ -149,9 +190,11 @@ def limited_legs(m: Machine, start: Motion, target: Motion, rates: vec6, dt: rea
     """Legs towards their asked rates, or braking to rest where that would lead into a singular pose."""
     moved = legs_towards(m, start, target, rates, dt)
     reached = vec6()
+    extensions = vec6()
     for i in range(6):
         reached[i] = moved.rate[i + 2]
-    if keeps_clear(m, start, moved.displacement, moved.beta, reached):
+        extensions[i] = moved.position[i + 2]
+    if keeps_clear(m, start, moved.displacement, moved.beta, extensions, reached):
         return moved
     return legs_towards(m, start, target, vec6(), dt)
 
@@ -185,7 +228,7 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
     after = limit_axes(m, start, action, dt)
     extensions = leg_extensions(m.geometry, displacement, beta)
     rates = leg_rates(leg_jacobian(m.geometry, displacement, beta), velocity, beta, beta_rate)
-    clear = keeps_clear(m, start, displacement, beta, rates)
+    clear = keeps_clear(m, start, displacement, beta, extensions, rates)
     mask = command_limits(m, start, action, rates, clear, dt)
     if legs_may_follow(m, start, extensions, rates, dt) and clear:
         after = with_legs(after, extensions, rates)
@@ -238,7 +281,12 @@ def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
 
 @wp.func
 def actuate(
-    m: Machine, motion: Motion, delay: wp.array2d(dtype=SetPoint), environment: int, setpoint: Motion, dt: real
+    m: Machine,
+    motion: Motion,
+    delay: wp.array2d(dtype=SetPoint),
+    environment: int,
+    setpoint: Motion,
+    dt: real,
 ) -> Motion:
     """The true motion after a step: the set-point after dead time and lag.
 
