@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-
 from motion_cueing.evaluation.trajectory import LimitTable, Trajectory
 
 GRAVITY = 9.81
@@ -40,8 +39,8 @@ def trajectory(n: int = 201, dt: float = 0.05, **columns: Any) -> Trajectory:
     return Trajectory(**(values | columns))
 
 
-def drive(gain: float = 0.8, lag: float = 0.2, policy: str = "washout", maneuver: str = "weave") -> Trajectory:
-    """A car that weaves for 20 s and a simulator that follows with a gain and a lag; legs, tilt and carriage move."""
+def drive(gain: float = 0.8, lag: float = 0.2, policy: str = "washout") -> Trajectory:
+    """A car that weaves for 20 s, and a simulator that follows with a gain and a lag."""
     n, dt = 801, 0.025
     time = dt * np.arange(n)
 
@@ -52,14 +51,15 @@ def drive(gain: float = 0.8, lag: float = 0.2, policy: str = "washout", maneuver
 
     f_wanted, w_wanted = motion(time)
     f_late, w_late = motion(time - lag)
-    f_felt = gain * (f_late + [0.0, 0.0, GRAVITY]) - [0.0, 0.0, GRAVITY]
+    rest = np.array([0.0, 0.0, -GRAVITY])
+    f_felt = gain * (f_late - rest) + rest
     wave = np.sin(2.0 * np.pi * 0.2 * time)
     active = np.zeros((n, 9), dtype=np.uint8)
     active[100:140, 1] = 1
     return trajectory(
         n,
         dt,
-        maneuver=maneuver,
+        maneuver="weave",
         policy=policy,
         f_wanted=f_wanted,
         w_wanted=w_wanted,

@@ -1,0 +1,237 @@
+"""The command line: exit status, one clear line for what is wrong, and never a traceback."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.errors import MotionCueingError
+from motion_cueing.evaluation import evaluate_command
+from motion_cueing.evaluation.__main__ import with_default
+from motion_cueing.evaluation.command_line import COMMANDS, main
+from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line
+from motion_cueing.evaluation.results import Results
+from motion_cueing.evaluation.trajectory import Trajectory
+
+from .synthetic import drive
+
+
+@pytest.fixture
+def simulator(monkeypatch):
+    """A simulator that answers at once: its policies are gains, and `broken` fails."""
+
+    def drive_with(name, platform, car):
+        gains = {"no-motion": 0.0, "classical": 0.8}
+
+        def work(cues):
+            if cues.name == "fails":
+                raise MotionCueingError("the road ends")
+            return drive(gain=gains[name])
+
+        return work
+
+    monkeypatch.setattr(evaluate_command, "_drive_with", drive_with)
+    monkeypatch.setattr(
+        evaluate_command, "find_policies", lambda names: {n: n for n in names or ["classical", "no-motion"]}
+    )
+
+
+@pytest.fixture
+def cue_file(tmp_path):
+    """A good cue CSV."""
+    return write_cues(tmp_path / "bend.csv")
+
+
+def write_cues(path):
+    time = 0.01 * np.arange(50)
+    force = np.tile([0.0, 0.0, -9.81], (50, 1))
+    CueTrace("bend", time, force, np.zeros((50, 3))).to_csv(path)
+    return path
+
+
+def complaint(capsys, argv, status=2):
+    """What the command line says on stderr: one line."""
+    assert main([str(word) for word in argv]) == status
+    text = capsys.readouterr().err
+    assert "Traceback" not in text
+    lines = [line for line in text.splitlines() if line.startswith("motion-cueing")]
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_evaluate_writes_everything(simulator, cue_file, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["evaluate", "--maneuver", str(cue_file), "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert {file.name for file in out.iterdir()} == {
+        "results.json",
+        "results.csv",
+        "report.html",
+        "bend.png",
+        "trajectories",
+    }
+    results = Results.load_json(out / "results.json")
+    assert list(results.maneuvers["bend"]) == ["classical", "no-motion"]
+    assert results.provenance.command == f"motion-cueing evaluate --maneuver {cue_file} --out {out}"
+    assert Trajectory.load(out / "trajectories" / "bend--classical.npz").maneuver == "bend"
+    for text in ("classical is best", "bend", "perceived J", str(out)):
+        assert text in shown
+
+
+def test_a_maneuver_that_fails_leaves_the_others_and_exits_1(simulator, cue_file, tmp_path, capsys):
+    fails, out = write_cues(tmp_path / "fails.csv"), tmp_path / "out"
+    assert main(["evaluate", "--maneuver", str(fails), str(cue_file), "--out", str(out)]) == 1
+    output = capsys.readouterr()
+    assert "Traceback" not in output.out + output.err
+    assert "the road ends" in output.out
+    results = Results.load_json(out / "results.json")
+    assert list(results.maneuvers) == ["bend"]
+    assert {failure.maneuver for failure in results.failures} == {"fails"}
+    assert "the road ends" in (out / "report.html").read_text()
+
+
+def test_an_interrupt_ends_with_130(simulator, cue_file, tmp_path, monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(evaluate_command, "run_suite", interrupt)
+    said = complaint(capsys, ["evaluate", "--maneuver", cue_file, "--out", tmp_path / "out"], 130)
+    assert said == "motion-cueing evaluate: interrupted"
+
+
+def test_a_folder_that_cannot_be_made_is_a_failure(simulator, cue_file, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    said = complaint(capsys, ["evaluate", "--maneuver", cue_file, "--out", tmp_path / "file" / "deep"], 1)
+    assert "file" in said
+
+
+@pytest.mark.parametrize(
+    ("argv", "told"),
+    [
+        (["evalute"], "unknown command 'evalute'. Did you mean evaluate?"),
+        (["evaluate", "--polcy", "x"], "Did you mean --policy?"),
+        (["evaluate", "--out"], "--out"),
+        (["evaluate", "stray"], "stray"),
+        (["evaluate", "--policy", "a", "--policy", "b"], "--policy is given 2 times"),
+        (["evaluate", "--maneuver"], "--maneuver needs at least one name"),
+        (["evaluate", "--paper", "--car", "bmw-320i"], "--paper has its own cases"),
+        (["evaluate", "--policy", "no-moton"], "unknown policy 'no-moton'. Did you mean no-motion"),
+        (
+            ["evaluate", "--maneuver", "steady-trun"],
+            "unknown maneuver 'steady-trun'. Did you mean",
+        ),
+        (["evaluate", "--platform", "papr"], "unknown platform 'papr'. Did you mean paper?"),
+        (["evaluate", "--car", "sedna"], "unknown car 'sedna'. Did you mean sedan?"),
+        (["evaluate", "--maneuver", "missing.csv"], "missing.csv: there is no such file"),
+        (["evaluate", "--platform", "missing.yaml"], "missing.yaml: there is no such file"),
+        (["evaluate", "--policy", "missing.yaml"], "missing.yaml: there is no such file"),
+    ],
+)
+def test_bad_arguments_exit_2_with_one_line(argv, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert told in complaint(capsys, argv)
+
+
+HEADER = (
+    "time_s,specific_force_x_m_s2,specific_force_y_m_s2,specific_force_z_m_s2,"
+    "angular_velocity_x_rad_s,angular_velocity_y_rad_s,angular_velocity_z_rad_s\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("", "empty"),
+        (HEADER, "empty"),
+        ("time_s,specific_force_x_m_s2\n0,1\n1,2\n", "missing column specific_force_y_m_s2"),
+        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,nan,0,-9.81,0,0,0\n", "specific_force is not finite at sample 1"),
+        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0,inf,0,0,0\n", "specific_force is not finite at sample 1"),
+        (HEADER + "0.1,0,0,-9.81,0,0,0\n0,0,0,-9.81,0,0,0\n", "time does not increase at sample 1"),
+        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0\n", "row 3 has 3 cells"),
+        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,x,0,-9.81,0,0,0\n", "could not convert string to float"),
+    ],
+)
+def test_bad_cues_exit_2_before_anything_is_driven(content, told, tmp_path, capsys):
+    path = tmp_path / "cues.csv"
+    path.write_text(content)
+    said = complaint(capsys, ["evaluate", "--maneuver", path, "--out", tmp_path / "out"])
+    assert told in said
+    assert "cues" in said
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("name: x\ndescription: y\nhexapd: {}\n", "unknown field 'hexapd'. Did you mean hexapod?"),
+        ("name: [", "not YAML"),
+        ("- 1\n", "expected fields of Platform"),
+    ],
+)
+def test_bad_platform_files_exit_2(content, told, tmp_path, capsys):
+    path = tmp_path / "machine.yaml"
+    path.write_text(content)
+    assert told in complaint(capsys, ["evaluate", "--platform", path, "--out", tmp_path / "out"])
+
+
+def test_an_output_folder_that_is_a_file_is_refused(tmp_path, capsys):
+    (tmp_path / "taken").write_text("")
+    assert "is a file; name a folder" in complaint(capsys, ["evaluate", "--out", tmp_path / "taken"])
+
+
+def test_list_shows_every_kind(capsys):
+    assert main(["list"]) == 0
+    shown = capsys.readouterr().out
+    for name in ("no-motion", "steady-turn", "city-drive", "paper", "sedan"):
+        assert name in shown
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help(name, capsys):
+    assert main([name, "--help"]) == 0
+    assert f"usage: motion-cueing {name}" in capsys.readouterr().out
+
+
+def test_overview_and_version(capsys):
+    assert main(["--help"]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in COMMANDS)
+    assert main([]) == 2
+    capsys.readouterr()
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("motion-cueing 0.")
+
+
+def test_the_module_evaluates_by_default():
+    assert with_default([]) == ["evaluate"]
+    assert with_default(["--policy", "x"]) == ["evaluate", "--policy", "x"]
+    assert with_default(["list"]) == ["list"]
+    assert with_default(["--help"]) == ["--help"]
+
+
+def test_the_recorded_command_gives_the_same_command():
+    import tyro
+
+    command = EvaluateCommand(policy=("a", "b"), maneuver=("hill",), car="volvo-v40")
+    words = command_line(command)
+    assert words[:2] == ("motion-cueing", "evaluate")
+    assert tyro.cli(EvaluateCommand, args=list(words[2:])) == command
+    assert command_line(EvaluateCommand()) == ("motion-cueing", "evaluate")
+
+
+def test_help_and_evaluate_do_not_import_torch():
+    script = (
+        "import sys; from motion_cueing.evaluation.command_line import main; "
+        "main(['evaluate', '--help']); sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True).returncode == 0
+
+
+def test_results_are_json_for_other_tools(simulator, cue_file, tmp_path):
+    main(["evaluate", "--maneuver", str(cue_file), "--out", str(tmp_path / "out")])
+    values = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert values["maneuvers"]["bend"]["classical"]["cue_error"] > 0.0

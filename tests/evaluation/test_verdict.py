@@ -1,0 +1,104 @@
+"""The verdict names the better policy, the margin and the reason, checked on drives built to have them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from motion_cueing.evaluation.metrics import measure
+from motion_cueing.evaluation.verdict import advantage, judge, judge_suite, terms
+
+from .synthetic import GRAVITY, drive, trajectory
+
+STILL = measure(drive(gain=0.0))
+GOOD = measure(drive(gain=0.9, lag=0.0))
+LATE = measure(drive(gain=0.9, lag=0.4))
+
+
+def push(y: float):
+    """A car pushed by 1 m/s^2 to the right, the simulator by ``y``."""
+    wanted, felt = np.tile([0.0, 1.0, -GRAVITY], (201, 1)), np.tile([0.0, y, -GRAVITY], (201, 1))
+    return measure(trajectory(f_wanted=wanted, f_felt=felt))
+
+
+def test_terms_add_up_to_the_cue_error():
+    for metrics in (STILL, GOOD, LATE):
+        assert sum(terms(metrics).values()) == pytest.approx(metrics.cue_error)
+
+
+def test_the_lowest_cue_error_is_best_and_the_margin_is_relative():
+    verdict = judge("weave", {"late": LATE, "no-motion": STILL, "good": GOOD})
+    assert verdict.ranking == ("good", "late", "no-motion")
+    assert verdict.cue_error == GOOD.cue_error
+    assert [a.over for a in verdict.advantages] == ["late", "no-motion"]
+    assert verdict.advantages[0].margin == pytest.approx(1.0 - GOOD.cue_error / LATE.cue_error)
+    assert verdict.advantages[1].margin == pytest.approx(1.0 - GOOD.cue_error / STILL.cue_error)
+
+
+@pytest.mark.parametrize(("worse", "cause"), [(0.0, "missing"), (-1.0, "false"), (0.4, "shape")])
+def test_the_cause_is_what_the_other_does_wrong(worse, cause):
+    why = judge("push", {"a": push(0.9), "b": push(worse)}).advantages[0]
+    assert (why.axis, why.cause) == ("f_y", cause)
+    assert why.axis_share == pytest.approx(1.0)
+    assert why.worse_axis is None
+
+
+def test_the_axis_on_which_the_best_is_worse_is_named():
+    f = np.tile([0.0, 2.0, -GRAVITY], (201, 1))
+    tilt = np.tile([0.07, 0.0, 0.0], (201, 1))
+    tilting = measure(trajectory(f_wanted=f, f_felt=f, w_felt=tilt))
+    still = measure(trajectory(f_wanted=f))
+    why = judge("turn", {"no-motion": still, "tilting": tilting}).advantages[0]
+    loss = (0.07 / np.radians(3.0)) ** 2
+    gain = (2.0 / 0.6) ** 2
+    assert (why.axis, why.cause, why.worse_axis, why.worse_cause) == ("f_y", "missing", "w_x", "false")
+    assert why.axis_share == pytest.approx(gain / (gain - loss))
+    assert "worse of the two on w_x" in " ".join(judge("t", {"no-motion": still, "a": tilting}).sentences)
+
+
+def test_equal_policies_are_level():
+    verdict = judge("weave", {"b": GOOD, "a": GOOD})
+    assert verdict.ranking == ("a", "b")
+    assert verdict.advantages[0].margin == 0.0
+    assert verdict.advantages[0].axis is None
+    assert "level" in verdict.sentences[1]
+
+
+def test_one_policy_alone_has_no_advantage():
+    verdict = judge("weave", {"good": GOOD})
+    assert verdict.advantages == ()
+    assert len(verdict.sentences) == 1
+
+
+def test_an_advantage_is_never_negative():
+    assert advantage(terms(STILL), "good", terms(GOOD)).margin == 0.0
+
+
+def test_the_perceived_best_is_named_where_it_differs():
+    rest = np.tile([0.0, 0.0, -GRAVITY], (201, 1))
+    numb = measure(trajectory(f_wanted=rest, f_felt=rest, sensed_f_felt=rest + 1.0))
+    off = measure(trajectory(f_felt=rest + 0.1))
+    verdict = judge("rest", {"numb": numb, "off": off})
+    assert (verdict.best, verdict.perceived_best) == ("numb", "off")
+    assert verdict.sentences[-1] == "By the perceived J, off is best."
+
+
+def test_the_suite_averages_only_what_every_policy_finished():
+    verdict, standings = judge_suite(
+        {
+            "weave": {"good": GOOD, "no-motion": STILL},
+            "again": {"good": LATE, "no-motion": STILL},
+            "broken": {"no-motion": GOOD},
+        }
+    )
+    assert verdict is not None
+    assert verdict.maneuver == "all"
+    assert [s.policy for s in standings] == ["good", "no-motion"]
+    assert standings[0].cue_error == pytest.approx((GOOD.cue_error + LATE.cue_error) / 2)
+    assert verdict.cue_error == pytest.approx(standings[0].cue_error)
+    assert (standings[0].wins, standings[0].maneuvers, standings[0].worst_maneuver) == (2, 2, "again")
+    assert standings[1].wins == 0
+
+
+def test_a_suite_without_a_common_maneuver_has_no_verdict():
+    assert judge_suite({"a": {"x": GOOD}, "b": {"y": GOOD}}) == (None, [])
+    assert judge_suite({}) == (None, [])
