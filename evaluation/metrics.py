@@ -233,7 +233,7 @@ def _stroke_share(position: Floats, low: float, high: float) -> float | None:
     """Share of the way from neutral to the nearer-reached limit."""
     if not (np.isfinite(low) and np.isfinite(high) and low < 0.0 < high):
         return None
-    return float(max(position.max() / high, position.min() / low))
+    return float(max(position.max() / high, position.min() / low, 0.0))
 
 
 def _clipped(trajectory: Trajectory, tolerance: float) -> float:
