@@ -53,7 +53,10 @@ def maneuver_figure(
             axes.set_xlabel("time (s)")
         first = next(iter(drives.values()))
         figure.suptitle(
-            f"{first.maneuver}: {first.car} car on {first.platform}", fontsize=13, x=0.01, ha="left"
+            f"{first.maneuver} (car {first.car}, motion base {first.platform})",
+            fontsize=13,
+            x=0.01,
+            ha="left",
         )
         figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=7, fontsize=9)
         return png(figure)
