@@ -52,12 +52,8 @@ def maneuver_figure(
         for axes in grid[-1]:
             axes.set_xlabel("time (s)")
         first = next(iter(drives.values()))
-        figure.suptitle(
-            f"{first.maneuver} (car {first.car}, motion base {first.platform})",
-            fontsize=13,
-            x=0.01,
-            ha="left",
-        )
+        title = f"{first.maneuver} (car {first.car}, motion base {first.platform})"
+        figure.suptitle(title, fontsize=13, x=0.01, ha="left")
         figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=7, fontsize=9)
         return png(figure)
 
