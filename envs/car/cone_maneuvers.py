@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from functools import lru_cache
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 from scipy.ndimage import gaussian_filter1d
 
@@ -27,13 +28,13 @@ RUN_UP = 15.0
 """Straight driving between the settling and the first cones, where the way may start to swerve, m."""
 
 
-LAPS = 6
+LAPS = 4
 """Practice runs before the one that counts."""
 
-LEARNED = 0.7
+LEARNED = 0.5
 """Share of the deviation that the next run corrects."""
 
-BLUR = 1.5
+BLUR = 2.5
 """Standard deviation of the smoothing of that correction, m."""
 
 
@@ -65,7 +66,8 @@ class ConeManeuver(Maneuver):
     """
 
     speed: Positive = 80.0 * KMH
-    margin: Positive = 0.1
+    margin: Positive = 0.05
+    calm: Positive = 4.0
 
     @abstractmethod
     def track(self, car: Car) -> tuple[Gate, ...]:
@@ -126,9 +128,10 @@ class ObstacleAvoidance(ConeManeuver):
     """
 
     name: ClassVar[str] = "obstacle-avoidance"
-    summary: ClassVar[str] = "obstacle avoidance at 50 km/h (ISO 3888-2)"
+    summary: ClassVar[str] = "obstacle avoidance at 45 km/h (ISO 3888-2)"
 
-    speed: Positive = 50.0 * KMH
+    speed: Positive = 45.0 * KMH
+    margin: Positive = 0.1
     gap: Positive = 1.0
 
     def track(self, car: Car) -> tuple[Gate, ...]:
@@ -157,7 +160,8 @@ class Slalom(ConeManeuver):
     summary: ClassVar[str] = "slalom round cones 18 m apart at 50 km/h"
 
     speed: Positive = 50.0 * KMH
-    cones: int = 8
+    margin: Positive = 0.2
+    cones: Annotated[int, Field(ge=2)] = 8
     spacing: Positive = 18.0
     cone_width: Positive = 0.3
 

@@ -46,7 +46,9 @@ class Gate:
         return cls(start, start + length, middle - 0.5 * width, middle + 0.5 * width)
 
 
-def smoothest_way(gates: Sequence[Gate], car: Car, speed: float, length: float, margin: float) -> tuple[Floats, Floats]:
+def smoothest_way(
+    gates: Sequence[Gate], car: Car, speed: float, length: float, margin: float
+) -> tuple[Floats, Floats]:
     """Offsets y over x, m, that keep the whole body inside the gates with the least lateral acceleration and jerk.
 
     A linear program: min p + T q with |v^2 y"| <= p and |v^3 y"'| <= q, while for every cone at x_c that is beside
@@ -70,7 +72,9 @@ def smoothest_way(gates: Sequence[Gate], car: Car, speed: float, length: float, 
     cost = np.concatenate([np.zeros(n), [1.0, JERK_TIME]])
     result = linprog(cost, upper, right, still, np.zeros(6), bounds=(None, None), method="highs")
     if not result.success:
-        raise ConfigurationError(f"{car.name} does not fit between the cones with a margin of {margin} m; lower it")
+        raise ConfigurationError(
+            f"{car.name} does not fit between the cones with a margin of {margin} m; lower it"
+        )
     return x, np.asarray(result.x[:n])
 
 

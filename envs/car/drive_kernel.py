@@ -13,7 +13,6 @@ from .driver import DriverParameters, Errors, SpeedTarget, force_command, most_d
 from .paths import STEP
 from .schedules import DT
 from .vehicle_model import (
-    BRAKE,
     DRIVE,
     FORWARD,
     HEADING,
@@ -85,7 +84,7 @@ class Road:
 
 @wp.func
 def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
-    """The path between its points: curvature and slope change linearly, as on a clothoid."""
+    """The path between its points: curvature and slope change linearly, as on a clothoid; straight on after its end."""
     i = wp.clamp(int(wp.floor(station / real(STEP))), 0, task.path_points - 2)
     d = station - real(STEP) * real(i)
     here, there = paths[task.path_start + i], paths[task.path_start + i + 1]
@@ -95,7 +94,9 @@ def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
     road = Road()
     road.curvature = here[3] + bend * inside
     turned = here[3] * inside + real(0.5) * bend * inside * inside
-    road.heading = here[2] + turned + road.curvature * outside
+    road.heading = here[2] + turned
+    if outside != real(0.0):
+        road.curvature = real(0.0)
     middle = here[2] + real(0.5) * turned
     flat = wp.cos(here[4])
     road.x = here[0] + flat * (inside * wp.cos(middle) + outside * wp.cos(road.heading))

@@ -95,7 +95,12 @@ class SpeedTarget:
 
 @wp.func
 def force_command(
-    car: CarParameters, driver: DriverParameters, speed: real, position: real, target: SpeedTarget, grade: real
+    car: CarParameters,
+    driver: DriverParameters,
+    speed: real,
+    position: real,
+    target: SpeedTarget,
+    grade: real,
 ) -> real:
     """(D2) Force asked of drive (positive) or brakes (negative), N: feed-forward and feedback of speed and position.
 
@@ -106,7 +111,11 @@ def force_command(
         wanted = target.acceleration_now - driver.speed_gain * wp.max(speed, real(0.0))
         return car.mass * (wp.min(wanted, real(0.0)) - wp.abs(slope))
     follow = driver.position_gain * wp.min(real(0.5) * target.speed, real(1.0))
-    wanted = target.acceleration + driver.speed_gain * (target.speed - speed) + follow * (target.position - position)
+    wanted = (
+        target.acceleration
+        + driver.speed_gain * (target.speed - speed)
+        + follow * (target.position - position)
+    )
     return car.mass * (wanted + slope + car.rolling_resistance * real(GRAVITY)) + air_drag(car, speed)
 
 

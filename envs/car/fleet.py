@@ -56,7 +56,9 @@ BMW_320I: Final = Car(
         pitch_damping=11.45e3,
     ),
     tires=Tires(front_cornering_stiffness=129.697e3, rear_cornering_stiffness=105.400e3, friction=1.0489),
-    drivetrain=Drivetrain(max_drive_force=5.5e3, max_power=100e3, max_brake_force=12e3, drive_front_share=0.0),
+    drivetrain=Drivetrain(
+        max_drive_force=5.5e3, max_power=100e3, max_brake_force=12e3, drive_front_share=0.0
+    ),
     steering=Steering(ratio=16.0),
     reference_point=(-0.29, -0.35, 0.07),
 )

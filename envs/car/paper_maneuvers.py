@@ -52,7 +52,7 @@ class SteadyTurn(Maneuver):
         schedule = Schedule.of(self.speed, [Hold(self.settle + self.duration)])
         start = self.speed * self.settle
         knots = [(0.0, 0.0), (start, 0.0), (start + self.entry, 1.0 / self.radius)]
-        path = Path.of_curvature(clothoids(knots, float(schedule.distance[-1])))
+        path = Path.of_curvature(clothoids(knots, float(schedule.distance[-1]) + self.radius))
         return Plan(self.name, car, path, schedule, driver=self.driver)
 
 
@@ -78,7 +78,9 @@ class Braking(Maneuver):
     def plan(self, car: Car) -> Plan:
         """Straight on, steady, braking, standing."""
         stop = Change(0.0, self.deceleration, self.jerk, math.inf)
-        schedule = Schedule.of(self.speed, [Hold(self.settle), stop, Hold(self.calm, brake=self.deceleration)])
+        schedule = Schedule.of(
+            self.speed, [Hold(self.settle), stop, Hold(self.calm, brake=self.deceleration)]
+        )
         return Plan(self.name, car, straight(), schedule)
 
 
@@ -110,5 +112,7 @@ class LaneChange(Maneuver):
         """A straight with one sine of curvature."""
         schedule = Schedule.of(self.speed, [Hold(self.settle + self.duration + self.calm)])
         time = np.arange(0.0, schedule.distance[-1] + STEP, STEP) / self.speed - self.settle
-        wave = np.where((time > 0.0) & (time < self.duration), np.sin(2.0 * np.pi * time / self.duration), 0.0)
+        wave = np.where(
+            (time > 0.0) & (time < self.duration), np.sin(2.0 * np.pi * time / self.duration), 0.0
+        )
         return Plan(self.name, car, Path.of_curvature(-self.peak / self.speed**2 * wave), schedule)

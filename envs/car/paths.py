@@ -20,7 +20,7 @@ STEP: Final = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Points on a line, one every :data:`STEP` metres of it; beyond its end it goes on as it ended.
+    """Points on a line, one every :data:`STEP` metres of it; after its end it goes straight on.
 
     Args:
         x: North, m.
@@ -48,7 +48,7 @@ class Path:
 
     @property
     def length(self) -> float:
-        """m."""
+        """M."""
         return STEP * (len(self) - 1)
 
     def table(self) -> Floats:
@@ -97,6 +97,29 @@ def clothoids(knots: Sequence[tuple[float, float]], length: float) -> Floats:
     """Curvature every :data:`STEP` up to ``length``: linear between knots (distance in m, curvature in 1/m)."""
     stations, curvatures = zip(*knots, strict=True)
     return np.interp(np.arange(0.0, length + STEP, STEP), stations, curvatures)
+
+
+def bend(curvature: float, angle: float, transition: float) -> Floats:
+    """Curvature every :data:`STEP` of a bend through ``angle``, rad, in the sense of ``curvature``, 1/m.
+
+    Clothoids of ``transition`` metres lead in and out; a bend too short for them is flattened.
+    """
+    top = min(abs(curvature), abs(angle) / transition)
+    arc = max(abs(angle) / top - transition, 0.0)
+    length = arc + 2.0 * transition
+    stations = np.arange(0.0, length, STEP)
+    shape = np.interp(stations, [0.0, transition, transition + arc, length], [0.0, 1.0, 1.0, 0.0])
+    # The sampled curvature, integrated as the path does, turns by exactly the angle.
+    return np.copysign(abs(angle) / (STEP * shape.sum()), curvature) * shape
+
+
+def smooth_steps(stations: Floats, knots: ArrayLike, values: Sequence[float]) -> Floats:
+    """Values at ``stations``, m, that pass from knot to knot along half a cosine."""
+    index = np.interp(stations, np.asarray(knots, dtype=np.float64), np.arange(len(values)))
+    below = np.clip(index.astype(int), 0, len(values) - 2)
+    blend = 0.5 - 0.5 * np.cos(np.pi * (index - below))
+    level = np.asarray(values, dtype=np.float64)
+    return np.asarray(level[below] + (level[below + 1] - level[below]) * blend)
 
 
 def _integral(values: Floats) -> Floats:

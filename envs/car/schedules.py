@@ -91,7 +91,9 @@ def _change(start: float, phase: Change) -> Floats:
     """A trapezoid of acceleration, lowered where the speed change is too small to reach its top."""
     release = phase.jerk if phase.release_jerk is None else phase.release_jerk
     if not min(phase.acceleration, phase.jerk, release) > 0.0 or not phase.speed >= 0.0:
-        raise ConfigurationError("a speed change needs positive acceleration and jerk and a speed not below 0")
+        raise ConfigurationError(
+            "a speed change needs positive acceleration and jerk and a speed not below 0"
+        )
     change, sign = abs(phase.speed - start), np.sign(phase.speed - start)
     if change == 0.0:
         return np.zeros((2, 0))

@@ -140,7 +140,9 @@ def fill(target: Any, source: Any) -> Any:
 
 def _trace(plan: Plan, rows: Floats) -> CueTrace:
     if not np.isfinite(rows).all():
-        raise DataError(f"{plan.name}: {plan.car.name} left the range of the vehicle model; ask for less speed or bend")
+        raise DataError(
+            f"{plan.name}: {plan.car.name} left the range of the vehicle model; ask for less speed or bend"
+        )
     return CueTrace(
         name=plan.name,
         time=DT * np.arange(len(rows)),

@@ -130,7 +130,9 @@ def most_resistance(car: CarParameters, brake: real, command: Commands, speed: r
 def solve_pair(mass: real, coupling: real, inertia: real, force: real, moment: real) -> vec2:
     """Solve [mass, coupling; coupling, inertia] [a; w] = [force; moment]."""
     determinant = mass * inertia - coupling * coupling
-    return vec2((inertia * force - coupling * moment) / determinant, (mass * moment - coupling * force) / determinant)
+    return vec2(
+        (inertia * force - coupling * moment) / determinant, (mass * moment - coupling * force) / determinant
+    )
 
 
 @wp.func

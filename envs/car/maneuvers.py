@@ -1,0 +1,44 @@
+"""The maneuvers of the package, by name."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ..errors import UnknownNameError
+from .cone_maneuvers import DoubleLaneChange, ObstacleAvoidance, Slalom
+from .maneuver import Maneuver
+from .paper_maneuvers import Braking, LaneChange, SteadyTurn
+from .steering_tests import SineWithDwell, StepSteer
+from .traffic_maneuvers import Acceleration, Hill, Roundabout, StopAndGo
+
+_MANEUVERS: Final[tuple[type[Maneuver], ...]] = (
+    SteadyTurn,
+    Braking,
+    LaneChange,
+    Acceleration,
+    DoubleLaneChange,
+    ObstacleAvoidance,
+    Slalom,
+    StepSteer,
+    SineWithDwell,
+    StopAndGo,
+    Roundabout,
+    Hill,
+)
+_BY_NAME: Final = {maneuver.name: maneuver for maneuver in _MANEUVERS}
+
+
+def maneuver_names() -> list[str]:
+    """Names that :func:`get_maneuver` knows, the paper's three first."""
+    return list(_BY_NAME)
+
+
+def get_maneuver(name: str) -> Maneuver:
+    """A maneuver with its default parameters.
+
+    Raises:
+        UnknownNameError: no such maneuver; the message lists the nearest names.
+    """
+    if name not in _BY_NAME:
+        raise UnknownNameError("maneuver", name, _BY_NAME)
+    return _BY_NAME[name]()

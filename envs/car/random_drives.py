@@ -1,0 +1,137 @@
+"""Random drives for training: seeded, of any length, on urban, rural and highway roads."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from ..cues import CueTrace
+from ..errors import UnknownNameError
+from ..settings import STRICT, NonNegative
+from .fleet import car_names, get_car
+from .paths import STEP, Path
+from .roads import KINDS, Road
+from .simulation import Plan, simulate
+from .speed_planning import Style, along_path, speed_limit
+from .vehicles import Car
+
+Floats = NDArray[np.float64]
+
+SETTLE: Final = 3.0
+"""Straight and steady driving before the first event, s."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class RandomDrives:
+    """A distribution of drives.
+
+    Args:
+        urban: Relative frequency of urban drives.
+        rural: Of rural drives.
+        highway: Of highway drives.
+        cars: Cars to draw from, by name.
+    """
+
+    urban: NonNegative = 0.5
+    rural: NonNegative = 0.3
+    highway: NonNegative = 0.2
+    cars: Annotated[tuple[str, ...], Field(min_length=1)] = ("sedan",)
+
+    def __post_init__(self) -> None:
+        if self.urban + self.rural + self.highway <= 0.0:
+            raise ValueError("one of urban, rural and highway must be positive")
+        for name in self.cars:
+            if name not in car_names():
+                raise ValueError(str(UnknownNameError("car", name, car_names())))
+
+    @property
+    def shares(self) -> Floats:
+        """Probabilities of the kinds, in the order of :data:`~.roads.KINDS`."""
+        weights = np.array([getattr(self, kind) for kind in KINDS])
+        return np.asarray(weights / weights.sum())
+
+    def plan(self, seed: int, duration: float, kind: str | None = None, car: Car | None = None) -> Plan:
+        """The drive that belongs to ``seed``; kind of road and car are drawn unless given."""
+        rng = np.random.default_rng(seed)
+        drawn_kind, drawn_car = str(rng.choice(list(KINDS), p=self.shares)), str(rng.choice(self.cars))
+        kind = drawn_kind if kind is None else kind
+        if kind not in KINDS:
+            raise UnknownNameError("kind of road", kind, KINDS)
+        return _plan(f"{kind}-{seed}", car or get_car(drawn_car), kind, rng, duration)
+
+
+def random_drive(
+    seed: int,
+    duration: float,
+    kind: str | None = None,
+    car: Car | None = None,
+    drives: RandomDrives | None = None,
+) -> CueTrace:
+    """One random drive.
+
+    Args:
+        seed: The same seed gives the same drive.
+        duration: s.
+        kind: "urban", "rural" or "highway"; drawn if None.
+        car: Drawn from ``drives.cars`` if None.
+        drives: What to draw from.
+
+    Raises:
+        UnknownNameError: no such kind of road.
+    """
+    return simulate([(drives or RandomDrives()).plan(seed, duration, kind, car)])[0]
+
+
+def drive_seeds(n: int, seed: int) -> list[int]:
+    """The seeds of the ``n`` drives of a batch: well apart for any two values of ``seed``."""
+    return [int(s) for s in np.random.SeedSequence(seed).generate_state(n, np.uint32)]
+
+
+def random_drives(
+    n: int,
+    duration: float,
+    seed: int,
+    kind: str | None = None,
+    car: Car | None = None,
+    drives: RandomDrives | None = None,
+    device: str = "cpu",
+) -> list[CueTrace]:
+    """``n`` random drives in one launch; row i is ``random_drive(drive_seeds(n, seed)[i], duration, ...)``."""
+    source = drives or RandomDrives()
+    return simulate([source.plan(one, duration, kind, car) for one in drive_seeds(n, seed)], device)
+
+
+def _plan(name: str, car: Car, kind_name: str, rng: np.random.Generator, duration: float) -> Plan:
+    kind = KINDS[kind_name]
+    road = Road(kind, rng, float(rng.uniform(*kind.speed)))
+    style = Style(road.draw(kind.accelerate), road.draw(kind.brake), road.draw(kind.lateral))
+    # Long enough to brake to rest after the settling, whatever comes.
+    road.add_straight(road.limit * (SETTLE + 1.0) + road.limit**2 / (2.0 * style.brake))
+    while _shortest_time(road) < duration + SETTLE:
+        road.add_event()
+    curvature = np.concatenate(road.curvature)
+    path = Path.of_curvature(curvature, _slope(road, len(curvature)))
+    limit = speed_limit(curvature, np.concatenate(road.limits), style)
+    stops = [(point, wait) for point, wait in road.stops if point < len(curvature)]
+    return Plan(
+        name, car, path, along_path(limit, style, stops, duration), source=f"random {kind_name} drive"
+    )
+
+
+def _shortest_time(road: Road) -> float:
+    """Time on the road at its limits, without standing: below what any drive takes, s."""
+    return float(sum(STEP * len(piece) / piece[0] for piece in road.limits))
+
+
+def _slope(road: Road, points: int) -> Floats:
+    """Two waves of the road's slope, rising from level after the first 100 m."""
+    stations = STEP * np.arange(points)
+    fade = np.clip((stations - 100.0) / 200.0, 0.0, 1.0)
+    amplitude, slope = road.draw(road.kind.grade), np.zeros(points)
+    for length in (road.draw((300.0, 600.0)), road.draw((700.0, 1500.0))):
+        slope += 0.5 * amplitude * np.sin(2.0 * np.pi * stations / length + road.draw((0.0, 2.0 * np.pi)))
+    return np.asarray(slope * fade**2 * (3.0 - 2.0 * fade))

@@ -1,0 +1,202 @@
+"""Random roads: stretches of curvature, speed limit and stops, put one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .paths import STEP, bend
+
+Floats = NDArray[np.float64]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class RoadKind:
+    """What a kind of road is made of. Ranges are drawn from uniformly (radii by their logarithm).
+
+    Args:
+        speed: Limits of the road, m/s.
+        accelerate: Largest acceleration of its drivers, m/s^2.
+        brake: Largest deceleration, m/s^2.
+        lateral: Largest centripetal acceleration, m/s^2.
+        straight: Length between events, m.
+        radius: Of bends, m.
+        angle: Of bends, rad.
+        transition: Length of their clothoids, m.
+        lane_change: Duration of a lane change, s.
+        grade: Amplitude of the slope, rad.
+        events: Relative frequency of each event.
+    """
+
+    speed: Range
+    accelerate: Range
+    brake: Range
+    lateral: Range
+    straight: Range
+    radius: Range
+    angle: Range
+    transition: Range
+    lane_change: Range
+    grade: Range
+    events: dict[str, float]
+
+
+KMH: Final = 1.0 / 3.6
+
+KINDS: Final = {
+    "urban": RoadKind(
+        speed=(30 * KMH, 60 * KMH),
+        accelerate=(1.0, 2.4),
+        brake=(1.2, 3.0),
+        lateral=(1.5, 3.0),
+        straight=(15.0, 120.0),
+        radius=(25.0, 150.0),
+        angle=(0.2, 1.2),
+        transition=(8.0, 20.0),
+        lane_change=(2.8, 5.0),
+        grade=(0.0, 0.02),
+        events={"bend": 3, "corner": 3, "stop": 2.5, "slow": 2, "lane_change": 2, "roundabout": 1},
+    ),
+    "rural": RoadKind(
+        speed=(60 * KMH, 100 * KMH),
+        accelerate=(0.8, 2.0),
+        brake=(1.0, 2.5),
+        lateral=(1.5, 3.0),
+        straight=(30.0, 250.0),
+        radius=(70.0, 500.0),
+        angle=(0.2, 1.3),
+        transition=(20.0, 60.0),
+        lane_change=(3.5, 6.0),
+        grade=(0.0, 0.05),
+        events={"bend": 6, "corner": 0.5, "stop": 0.5, "slow": 2, "lane_change": 1.5, "roundabout": 0.5},
+    ),
+    "highway": RoadKind(
+        speed=(85 * KMH, 130 * KMH),
+        accelerate=(0.4, 1.2),
+        brake=(0.6, 1.8),
+        lateral=(0.6, 1.5),
+        straight=(60.0, 400.0),
+        radius=(500.0, 2000.0),
+        angle=(0.1, 0.6),
+        transition=(60.0, 150.0),
+        lane_change=(4.5, 8.0),
+        grade=(0.0, 0.03),
+        events={"bend": 3, "slow": 2.5, "lane_change": 3},
+    ),
+}
+"""Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers."""
+
+CORNER_RADIUS: Final[Range] = (9.0, 18.0)
+"""Of a right-angled turn at a crossing, m."""
+
+ROUNDABOUT_RADIUS: Final[Range] = (14.0, 25.0)
+"""Of the circle driven, m."""
+
+LANE_WIDTH: Final[Range] = (2.8, 3.75)
+"""m."""
+
+
+@dataclass
+class Road:
+    """A road under construction: what to drive, how fast, and where to stop.
+
+    Args:
+        kind: Of road.
+        rng: Source of chance.
+        limit: Speed limit in force, m/s.
+    """
+
+    kind: RoadKind
+    rng: np.random.Generator
+    limit: float
+    curvature: list[Floats] = field(default_factory=list)
+    limits: list[Floats] = field(default_factory=list)
+    stops: list[tuple[int, float]] = field(default_factory=list)
+    points: int = 0
+
+    def draw(self, bounds: Range) -> float:
+        """Uniform within the bounds."""
+        return float(self.rng.uniform(*bounds))
+
+    def sign(self) -> float:
+        """Left (-1) or right (1)."""
+        return float(self.rng.choice((-1.0, 1.0)))
+
+    def add(self, curvature: Floats, limit: float | None = None) -> None:
+        """Append a stretch, with a limit of its own or the road's."""
+        self.curvature.append(curvature)
+        self.limits.append(np.full(len(curvature), self.limit if limit is None else limit))
+        self.points += len(curvature)
+
+    def add_straight(self, length: float) -> None:
+        """Append a straight, m."""
+        self.add(np.zeros(max(round(length / STEP), 1)))
+
+    def add_event(self) -> None:
+        """Append one random event and the straight after it."""
+        names = list(self.kind.events)
+        weights = np.array([self.kind.events[name] for name in names])
+        EVENTS[str(self.rng.choice(names, p=weights / weights.sum()))](self)
+        self.add_straight(self.draw(self.kind.straight))
+
+
+def add_bend(road: Road) -> None:
+    """A bend of the road's kind."""
+    low, high = np.log(road.kind.radius)
+    radius = float(np.exp(road.rng.uniform(low, high)))
+    road.add(bend(road.sign() / radius, road.draw(road.kind.angle), road.draw(road.kind.transition)))
+
+
+def add_corner(road: Road) -> None:
+    """A right-angled turn at a crossing."""
+    angle = road.draw((0.4 * np.pi, 0.6 * np.pi))
+    road.add(bend(road.sign() / road.draw(CORNER_RADIUS), angle, road.draw((5.0, 9.0))))
+
+
+def add_stop(road: Road) -> None:
+    """A stop of 2 to 8 s."""
+    road.stops.append((road.points, road.draw((2.0, 8.0))))
+
+
+def add_slow(road: Road) -> None:
+    """Another speed limit, or for a while the slower one of traffic ahead."""
+    if road.rng.random() < 0.5:
+        road.limit = road.draw(road.kind.speed)
+    else:
+        road.add(
+            np.zeros(round(road.draw((1.0, 4.0)) * road.limit / STEP)), road.draw((0.4, 0.8)) * road.limit
+        )
+
+
+def add_lane_change(road: Road) -> None:
+    """To the next lane, by one sine of curvature: offset A T^2 / (2 pi) at the limit."""
+    length = road.draw(road.kind.lane_change) * road.limit
+    stations = np.arange(0.0, length, STEP)
+    peak = 2.0 * np.pi * road.draw(LANE_WIDTH) / length**2
+    road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length))
+
+
+def add_roundabout(road: Road) -> None:
+    """Round a roundabout to one of its exits (traffic on the right)."""
+    deflection = road.draw((0.6, 1.0))
+    turn = float(road.rng.choice((-0.5, 0.0, 0.5))) * np.pi
+    aside = bend(1.0 / road.draw((20.0, 35.0)), deflection, 7.0)
+    circle = bend(-1.0 / road.draw(ROUNDABOUT_RADIUS), max(turn + 2.0 * deflection, 0.3), 7.0)
+    for piece in (aside, circle, aside):
+        road.add(piece)
+
+
+EVENTS: Final[dict[str, Callable[[Road], None]]] = {
+    "bend": add_bend,
+    "corner": add_corner,
+    "stop": add_stop,
+    "slow": add_slow,
+    "lane_change": add_lane_change,
+    "roundabout": add_roundabout,
+}
+"""What can happen on a road, by name."""
