@@ -7,6 +7,7 @@ the first import, selects single precision (useful on consumer GPUs).
 from __future__ import annotations
 
 import os
+import sys
 from typing import Any, Final
 
 import numpy as np
@@ -14,10 +15,23 @@ import warp as wp
 
 from .errors import ConfigurationError
 
-# A machine without a GPU is no reason for a warning; later warnings are.
-wp.config.log_level = wp.LOG_ERROR
-wp.init()
-wp.config.log_level = wp.LOG_WARNING
+
+def _initialise_quietly() -> None:
+    """Start Warp without its greeting and its native warning on a machine that has no GPU."""
+    wp.config.log_level = wp.LOG_ERROR
+    sys.stderr.flush()
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        wp.init()
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)
+    wp.config.log_level = wp.LOG_WARNING
+
+
+_initialise_quietly()
 
 _NAME: Final = os.environ.get("MOTION_CUEING_PRECISION", "double")
 if _NAME not in ("single", "double"):

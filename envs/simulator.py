@@ -81,7 +81,7 @@ class Simulator:
         perception = [vestibular_parameters(self.vestibular, self.dt)]
         self._perception = _structs(Vestibular, perception, device)
         self._drives = upload_drives(self.drives, self.platforms[0], self.dt, device)
-        self._machine_of = wp.array(self.platform_of, dtype=int, device=device)
+        self.machine_of = wp.array(self.platform_of, dtype=int, device=device)
         self._drive_of = wp.array(self.drive_of, dtype=int, device=device)
         depth = 1 + max(max(dead_steps(p, self.dt)) for p in self.platforms)
         self._states = [wp.zeros(n, dtype=State, device=device) for _ in range(2)]
@@ -102,7 +102,7 @@ class Simulator:
                 self.machines,
                 self._perception,
                 self._drives,
-                self._machine_of,
+                self.machine_of,
                 self._drive_of,
                 real(self.dt),
                 self._states[begin],
@@ -166,7 +166,7 @@ class Simulator:
                 self.machines,
                 self._perception,
                 self._drives,
-                self._machine_of,
+                self.machine_of,
                 self._drive_of,
                 wp.array(samples, dtype=int, device=self.device),
                 wp.array(poses, dtype=vec9, device=self.device),

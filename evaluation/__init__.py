@@ -2,7 +2,8 @@
 
 from .criteria import Criteria
 from .metrics import Metrics, measure
+from .rollout import rollout
 from .trajectory import LimitTable, Trajectory
 from .verdict import judge
 
-__all__ = ["Criteria", "LimitTable", "Metrics", "Trajectory", "judge", "measure"]
+__all__ = ["Criteria", "LimitTable", "Metrics", "Trajectory", "judge", "measure", "rollout"]

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..envs.platform import ACTUATORS
 from .criteria import Criteria
 from .figure_style import CAR, LIMIT, limit_lines, line_styles, new_figure, png, styled
 from .metrics import AXES, cab_motion, cue_error, tilt_rate
-from .trajectory import ACTUATORS, Floats, Trajectory
+from .trajectory import Floats, Trajectory
 
 _CUES = (
     ("Specific force x (surge)", "m/s²", 1.0),

@@ -8,10 +8,11 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from ..envs.cues import GRAVITY
+from ..envs.platform import ACTUATORS, AXES
 from ..envs.settings import STRICT
 from . import signals
 from .criteria import Criteria
-from .trajectory import ACTUATORS, AT_ACCELERATION, AT_DISPLACEMENT, AT_VELOCITY, COMMANDS, Floats, Trajectory
+from .trajectory import AT_ACCELERATION, AT_DISPLACEMENT, AT_VELOCITY, Floats, Trajectory
 
 AXES: Final = ("f_x", "f_y", "f_z", "w_x", "w_y", "w_z")
 """Specific force (m/s^2) and angular velocity (rad/s) in the cab's axes."""
@@ -138,7 +139,7 @@ def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics
         tilt_rate_peak=float(rate.max()),
         tilt_rate_share=float(np.mean(rate > criteria.tilt_rate * (1.0 + signals.FLAT))),
         actuators=_actuators(trajectory),
-        travel=dict(zip(COMMANDS[2:8], np.abs(trajectory.hexapod).max(axis=0).tolist(), strict=True)),
+        travel=dict(zip(AXES[2:8], np.abs(trajectory.hexapod).max(axis=0).tolist(), strict=True)),
         at_limit=float(np.any(flags, axis=1).mean()),
         at_displacement=float(np.any(flags & AT_DISPLACEMENT, axis=1).mean()),
         at_velocity=float(np.any(flags & AT_VELOCITY, axis=1).mean()),

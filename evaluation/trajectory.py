@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.errors import DataError
+from ..envs.platform import ACTUATORS
 from ..envs.storage import write_bytes
 
 Floats = NDArray[np.float64]
@@ -29,31 +30,6 @@ AT_VELOCITY: Final = 2
 """Bit of :attr:`Trajectory.limits_active`: the velocity limit holds."""
 AT_ACCELERATION: Final = 4
 """Bit of :attr:`Trajectory.limits_active`: the acceleration limit holds."""
-
-ACTUATORS: Final = (
-    "carriage_x",
-    "carriage_y",
-    "leg_1",
-    "leg_2",
-    "leg_3",
-    "leg_4",
-    "leg_5",
-    "leg_6",
-    "turntable",
-)
-"""Columns of :attr:`Trajectory.limits_active` and entries of a :class:`LimitTable`."""
-COMMANDS: Final = (
-    "carriage_x",
-    "carriage_y",
-    "hexapod_x",
-    "hexapod_y",
-    "hexapod_z",
-    "hexapod_roll",
-    "hexapod_pitch",
-    "hexapod_yaw",
-    "turntable",
-)
-"""Columns of :attr:`Trajectory.action` and :attr:`Trajectory.applied`."""
 
 _COLUMNS: Final[Mapping[str, tuple[int, ...]]] = {
     "time": (),
@@ -141,7 +117,7 @@ class Trajectory:
         turntable_rate: (n,) rad/s.
         legs: (n, 6) extensions from neutral, m.
         legs_rate: (n, 6) m/s.
-        action: (n, 9) accelerations asked in the step that ended at this row, by :data:`COMMANDS`;
+        action: (n, 9) accelerations asked in the step that ended at this row, by :data:`AXES`;
             m/s^2 and rad/s^2; zero in row 0.
         applied: (n, 9) accelerations that truly acted in that step.
         limits_active: (n, 9) bits :data:`AT_DISPLACEMENT`, :data:`AT_VELOCITY`, :data:`AT_ACCELERATION`

@@ -7,10 +7,10 @@ from math import radians
 
 import numpy as np
 import pytest
+from motion_cueing.envs.platform import ACTUATORS
 from motion_cueing.envs.settings import from_dict, to_dict
 from motion_cueing.evaluation.criteria import Criteria
 from motion_cueing.evaluation.metrics import AXES, Metrics, measure
-from motion_cueing.evaluation.trajectory import ACTUATORS
 
 from .synthetic import GRAVITY, drive, trajectory
 

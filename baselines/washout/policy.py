@@ -1,0 +1,138 @@
+"""The classical washout as a policy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from ...envs.errors import DataError
+from ...envs.observation import OBSERVATION_SIZE
+from ...envs.platform.machines import Cab
+from ...envs.precision import FLOAT, real, vec3, vec9
+from ...envs.simulator import N_AXES, TIME_STEP
+from ..policy import Array
+from .filters import HighPassParameters
+from .kernels import predict
+from .parameters import HighPass, LowPass, TiltCoordination, WashoutParameters, load_washout
+from .step import Memory, Parameters
+
+
+def _high_pass(block: HighPass) -> Any:
+    values: Any = HighPassParameters()
+    values.order, values.frequency, values.damping = block.order, block.frequency, block.damping
+    return values
+
+
+def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
+    """The kernels' form of a parameter set for a cab."""
+    k: Any = Parameters()
+    for name in ("force_scale", "force_limit", "rate_scale", "rate_limit"):
+        setattr(k, name, vec3(*getattr(p, name)))
+    blocks = {"hpr_roll": p.hpr[0], "hpr_pitch": p.hpr[1], "hpr_yaw": p.hpr[2], "hps_x": p.hps[0]}
+    blocks |= {"hps_y": p.hps[1], "hpi_x": p.hpi[0], "hpi_y": p.hpi[1], "hpi_z": p.hpi[2]}
+    for name, block in blocks.items():
+        setattr(k, name, _high_pass(block))
+    tilt = p.tilt or TiltCoordination()
+    k.tilt_gain = 1.0 if p.tilt else 0.0
+    k.tilt_frequency, k.tilt_damping = tilt.low_pass.frequency, tilt.low_pass.damping
+    k.tilt_rate, k.tilt_acceleration, k.tilt_approach = tilt.rate, tilt.acceleration, tilt.approach
+    lpc = p.lpc or LowPass(1.0)
+    k.carriage_share = 1.0 if p.lpc else 0.0
+    k.lpc_frequency, k.lpc_damping = lpc.frequency, lpc.damping
+    for name in ("rate_bandwidth", "turntable_share", "turntable_gain", "follow_frequency"):
+        setattr(k, name, getattr(p, name))
+    k.cab = vec3(*cab.reference_point)
+    return k
+
+
+class _Buffers:
+    """Arrays of one batch size and the launch recorded on them."""
+
+    def __init__(self, n: int, parameters: Any, parameters_of: Any, dt: float) -> None:
+        self.observation = wp.zeros((n, OBSERVATION_SIZE), dtype=real, device="cpu")
+        self.begins = wp.zeros(n, dtype=wp.bool, device="cpu")
+        self.memory = wp.zeros(n, dtype=Memory, device="cpu")
+        self.after = wp.zeros(n, dtype=Memory, device="cpu")
+        self.action = wp.zeros(n, dtype=vec9, device="cpu")
+        self.launch = wp.launch(
+            predict,
+            n,
+            inputs=[parameters, parameters_of, self.observation, self.begins, self.memory, real(dt)],
+            outputs=[self.after, self.action],
+            device="cpu",
+            record_cmd=True,
+        )
+        self.views = {name: getattr(self, name).numpy() for name in ("observation", "begins", "memory")}
+        self.results = self.after.numpy(), self.action.numpy()
+
+
+class ClassicalWashout:
+    """The paper's algorithm as a policy; its memory is the policy's state.
+
+    Args:
+        parameters: A parameter set, a preset name or a YAML file.
+        cab: Where the driver sits on the machine.
+        dt: Time step, s.
+    """
+
+    def __init__(
+        self,
+        parameters: WashoutParameters | str | Path = "classical",
+        cab: Cab | None = None,
+        dt: float = TIME_STEP,
+    ) -> None:
+        if not isinstance(parameters, WashoutParameters):
+            parameters = load_washout(parameters)
+        self.parameters = parameters
+        self.name = parameters.name
+        self.cab = cab or Cab()
+        self.dt = dt
+        self._kernel_parameters = wp.array(
+            [kernel_parameters(parameters, self.cab)], dtype=Parameters, device="cpu"
+        )
+        self._buffers: dict[int, _Buffers] = {}
+
+    @property
+    def start(self) -> Array:
+        """(9,) pose to begin a drive at: C'(0) and S'(0)."""
+        pose = np.zeros(N_AXES)
+        pose[:2], pose[2:5] = self.parameters.start_carriage, self.parameters.start_hexapod
+        return pose
+
+    def predict(
+        self,
+        observation: Array,
+        state: Any = None,
+        episode_start: Array | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, NDArray[Any]]:
+        """Accelerations for observations; see :class:`~motion_cueing.baselines.policy.Policy`.
+
+        Raises:
+            DataError: the observation has the wrong shape, or is not finite.
+        """
+        observation = np.asarray(observation, dtype=FLOAT)
+        if observation.ndim not in (1, 2) or observation.shape[-1] != OBSERVATION_SIZE:
+            raise DataError(f"observation has shape {observation.shape}, expected (n, {OBSERVATION_SIZE})")
+        if not np.isfinite(observation).all():
+            raise DataError("observation is not finite")
+        n = 1 if observation.ndim == 1 else len(observation)
+        buffers = self._buffers.get(n) or self._make_buffers(n)
+        buffers.views["observation"][...] = observation
+        buffers.views["begins"][...] = (
+            True if state is None else episode_start if episode_start is not None else False
+        )
+        if state is not None:
+            buffers.views["memory"][...] = state
+        buffers.launch.launch()
+        memory, action = buffers.results
+        return action.reshape(*observation.shape[:-1], N_AXES).copy(), memory.copy()
+
+    def _make_buffers(self, n: int) -> _Buffers:
+        parameters_of = wp.zeros(n, dtype=int, device="cpu")
+        self._buffers[n] = _Buffers(n, self._kernel_parameters, parameters_of, self.dt)
+        return self._buffers[n]
