@@ -21,7 +21,7 @@ from .schedules import Hold, Schedule
 from .simulation import Plan, simulate
 from .vehicles import Car
 
-TEST_DRIVER = Driver(preview_time=0.6)
+TEST_DRIVER = Driver(preview_time=0.7)
 """Aims nearer than in traffic."""
 
 RUN_UP = 15.0
@@ -42,8 +42,8 @@ BLUR = 2.5
 def practised_path(gates: tuple[Gate, ...], car: Car, speed: float, length: float, margin: float) -> Path:
     """The line to aim at so that the car, which lags behind its driver's aim, drives the smoothest way.
 
-    As on a proving ground the driver practises: after every run the aim is shifted by the deviation of the car from
-    the wanted way (iterative learning).
+    As on a proving ground the driver practises: after every run the aim is shifted by the deviation of the
+    car from the wanted way (iterative learning).
     """
     x, wanted = smoothest_way(gates, car, speed, length, margin)
     aim = wanted
@@ -93,8 +93,8 @@ class ConeManeuver(Maneuver):
 class DoubleLaneChange(ConeManeuver):
     """ISO 3888-1: out to a lane 3.5 m to the left and back, at 80 km/h.
 
-    Sections of 15, 30, 25, 25, 15 and 15 m; lanes 1.1 w + 0.25, 1.2 w + 0.25 and 1.3 w + 0.25 m wide (w: width of
-    the car), their middles 3.5 m apart.
+    Sections of 15, 30, 25, 25, 15 and 15 m; lanes 1.1 w + 0.25, 1.2 w + 0.25 and 1.3 w + 0.25 m wide (w:
+    width of the car), their middles 3.5 m apart.
 
     Args:
         offset: Between the middles of the lanes, m.
@@ -119,9 +119,10 @@ class DoubleLaneChange(ConeManeuver):
 class ObstacleAvoidance(ConeManeuver):
     """ISO 3888-2: round an obstacle to the left and back, sections of 12, 13.5, 11, 12.5 and 12 m.
 
-    Lanes 1.1 w + 0.25, w + 1 and at least 3 m (1.3 w + 0.25) wide; 1 m between the near edges of lanes 1 and 2; lane 3
-    in line with lane 1 at its outer edge. The standard leaves the speed to the test: the default is one that all
-    cars of the package can drive cleanly, and the driver keeps it, where the standard lets the throttle go.
+    Lanes 1.1 w + 0.25, w + 1 and at least 3 m (1.3 w + 0.25) wide; 1 m between the near edges of lanes 1 and
+    2; lane 3 in line with lane 1 at its outer edge. The standard leaves the speed to the test: the default is
+    one that all cars of the package can drive cleanly, and the driver keeps it, where the standard lets the
+    throttle go.
 
     Args:
         gap: Between the near edges of lanes 1 and 2, m.

@@ -29,7 +29,7 @@ SIDE_POINTS: Final = 80
 
 @dataclass(frozen=True)
 class Gate:
-    """Cones from ``start`` to ``end`` along the track, m, with bounds to the left and right, m (right positive)."""
+    """Cones from ``start`` to ``end`` along the track; bounds to the left and right (positive). In m."""
 
     start: float
     end: float
@@ -49,11 +49,11 @@ class Gate:
 def smoothest_way(
     gates: Sequence[Gate], car: Car, speed: float, length: float, margin: float
 ) -> tuple[Floats, Floats]:
-    """Offsets y over x, m, that keep the whole body inside the gates with the least lateral acceleration and jerk.
+    """Offsets y over x, m, that keep the body inside the gates with the least lateral acceleration and jerk.
 
-    A linear program: min p + T q with |v^2 y"| <= p and |v^3 y"'| <= q, while for every cone at x_c that is beside
-    the body (l = x_c - x between its rear and front) left + w/2 + margin <= y + l psi <= right - w/2 - margin, with
-    the heading psi of a car in a steady turn, y' - beta, beta = (b - m a v^2 / (L C_r)) y".
+    A linear program: min p + T q with |v^2 y"| <= p and |v^3 y"'| <= q, while for every cone at x_c that is
+    beside the body (l = x_c - x between its rear and front) left + w/2 + margin <= y + l psi <= right - w/2 -
+    margin, with the heading psi of a car in a steady turn, y' - beta, beta = (b - m a v^2 / (L C_r)) y".
 
     Raises:
         ConfigurationError: the car does not fit.
@@ -70,7 +70,7 @@ def smoothest_way(
     right = np.concatenate([np.zeros(2 * (second.shape[0] + third.shape[0])), bounds])
     still = sparse.hstack([_ends(n), sparse.csr_matrix((6, 2))])
     cost = np.concatenate([np.zeros(n), [1.0, JERK_TIME]])
-    result = linprog(cost, upper, right, still, np.zeros(6), bounds=(None, None), method="highs")
+    result = linprog(cost, upper, right, still, np.zeros(6), (None, None))  # type: ignore[call-overload]  # sparse
     if not result.success:
         raise ConfigurationError(
             f"{car.name} does not fit between the cones with a margin of {margin} m; lower it"
@@ -96,7 +96,7 @@ def _differences(n: int, order: int) -> sparse.csr_matrix:
 
 
 def _ends(n: int) -> sparse.csr_matrix:
-    """Rows that put the first three points on the axis and keep the last three level, with no offset drawn."""
+    """Rows that put the first three points on the axis and keep the last four level."""
     rows = np.zeros((6, n))
     rows[[0, 1, 2], [0, 1, 2]] = 1.0
     rows[3, [-1, -2]] = 1.0, -1.0

@@ -1,4 +1,5 @@
 """The kernel that drives a batch of cars through their plans, all time steps in one launch (Warp)."""
+# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 
@@ -84,7 +85,7 @@ class Road:
 
 @wp.func
 def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
-    """The path between its points: curvature and slope change linearly, as on a clothoid; straight on after its end."""
+    """The path between its points, curvature and slope changing linearly; straight on after its end."""
     i = wp.clamp(int(wp.floor(station / real(STEP))), 0, task.path_points - 2)
     d = station - real(STEP) * real(i)
     here, there = paths[task.path_start + i], paths[task.path_start + i + 1]
@@ -150,7 +151,7 @@ def pedals(car: CarParameters, force: real, speed: real) -> vec2:
 
 @wp.func
 def rolled(task: Task, road: Road, state: State, station: real, dt: real) -> real:
-    """The path's point nearest to the car, by one Newton step; without a path to follow, the distance driven."""
+    """The path's point nearest to the car, by one Newton step; the distance driven if there is no path."""
     if task.open_loop == 1:
         return station + state[FORWARD] * dt
     gap = offset_from(road, state)

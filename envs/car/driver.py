@@ -1,4 +1,5 @@
 """The driver: previews the path, steers along it, and keeps the speed with the pedals."""
+# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from pydantic.dataclasses import dataclass
 from ..cues import GRAVITY
 from ..precision import real
 from ..settings import STRICT, NonNegative, Positive
+from .tires import slip_for
 from .vehicle_model import (
     FORWARD,
     LATERAL,
@@ -21,13 +23,14 @@ wp.set_module_options({"enable_backward": False})
 
 @dataclass(frozen=True, config=STRICT)
 class Driver:
-    """How a driver steers and uses the pedals. The values are engineering choices within published human ranges.
+    """How a driver steers and uses the pedals. The values are engineering choices.
 
     Args:
-        preview_time: Time to the point the driver aims at, s. The path error then closes with natural frequency
-            sqrt(2) / preview_time and damping ratio 1 / sqrt(2).
+        preview_time: Time to the point the driver aims at, s. The path error then closes with natural
+            frequency sqrt(2) / preview_time and damping ratio 1 / sqrt(2).
         preview_distance: Least distance of that point, m.
-        anticipation: How far ahead the path's curvature is steered, s: makes up for arms, tires and yaw inertia.
+        anticipation: How far ahead the path's curvature is steered, s: makes up for arms, tires and yaw
+            inertia.
         hand_lag: Time constant of the arms, s.
         speed_gain: Acceleration asked for per speed error, 1/s.
         position_gain: Acceleration asked for per error of the position along the path, 1/s^2.
@@ -66,21 +69,33 @@ class Errors:
 
 
 @wp.func
-def wheel_command(car: CarParameters, driver: DriverParameters, state: State, errors: Errors) -> real:
-    """(D1) Steering-wheel angle: curvature feed-forward with understeer compensation, and preview feedback.
+def road_wheel_for(car: CarParameters, speed: real, curvature: real) -> real:
+    """(D1) Road-wheel angle of a steady turn, delta = L kappa + alpha_f - alpha_r with the tires' slips, rad.
 
-    The feedback aims at a point ahead on the path, kappa = -2 e_aim / l^2 with e_aim the offset extrapolated along
-    the course (heading plus side slip) to the distance l. In rad.
+    The feed-forward of Kapania and Gerdes (2015); in the linear range it is (L + K v^2) kappa.
+    """
+    wheelbase = car.front_axle + car.rear_axle
+    lateral = car.mass * speed * speed * curvature / wheelbase
+    grip = car.friction * car.mass * real(GRAVITY) / wheelbase
+    a, b = car.front_axle, car.rear_axle
+    front = slip_for(lateral * b, grip * b, car.front_cornering_stiffness, car.shape_factor)
+    rear = slip_for(lateral * a, grip * a, car.rear_cornering_stiffness, car.shape_factor)
+    return wp.atan(wheelbase * curvature) + front - rear
+
+
+@wp.func
+def wheel_command(car: CarParameters, driver: DriverParameters, state: State, errors: Errors) -> real:
+    """(D2) Steering-wheel angle: feed-forward of the anticipated curvature, and preview feedback.
+
+    The feedback aims at a point ahead on the path, kappa = -2 e_aim / l^2 with e_aim the offset extrapolated
+    along the course (heading plus side slip) to the distance l. In rad.
     """
     u = wp.max(state[FORWARD], real(0.0))
-    wheelbase = car.front_axle + car.rear_axle
-    front = car.rear_axle / car.front_cornering_stiffness
-    understeer = car.mass / wheelbase * (front - car.front_axle / car.rear_cornering_stiffness)
     distance = wp.max(driver.preview_time * u, driver.preview_distance)
     course = errors.heading + wp.atan2(state[LATERAL], wp.max(u, real(1.0)))
     aim = errors.offset + distance * wp.sin(course)
     curvature = errors.curvature_ahead - real(2.0) * aim / (distance * distance)
-    return car.ratio * wp.atan((wheelbase + understeer * u * u) * curvature)
+    return car.ratio * road_wheel_for(car, u, curvature)
 
 
 @wp.struct
@@ -102,7 +117,7 @@ def force_command(
     target: SpeedTarget,
     grade: real,
 ) -> real:
-    """(D2) Force asked of drive (positive) or brakes (negative), N: feed-forward and feedback of speed and position.
+    """(D3) Force asked of drive (positive) or brakes (negative), N: feed-forward and feedback.
 
     Where the plan stands still, the planned (negative) acceleration is the brake that holds the car.
     """

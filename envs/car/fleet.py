@@ -62,10 +62,11 @@ BMW_320I: Final = Car(
     steering=Steering(ratio=16.0),
     reference_point=(-0.29, -0.35, 0.07),
 )
-"""commonroad-vehicle-models 3.0.2 (BSD-3), vehicle 2: masses, lengths, inertias, sizes. Roll stiffness and damping
-are (K_s T^2 / 2) of both axles and the anti-roll bars, pitch ones 2 (K_sf a^2 + K_sr b^2), with the arm h_s (its roll
-axis lies on the ground). Cornering stiffness is 21.92 (p_Ky1) times the static axle load: a neutral car. Drive force,
-power, brake force, steering ratio, overhangs and seat are engineering choices."""
+"""commonroad-vehicle-models 3.0.2 (BSD-3), vehicle 2: masses, lengths, inertias, sizes. Roll stiffness,
+damping are (K_s T^2 / 2) of both axles and the anti-roll bars, pitch ones 2 (K_sf a^2 + K_sr b^2), with
+the arm h_s (its roll axis lies on the ground). Cornering stiffness is 21.92 (p_Ky1) times the static
+axle load: a neutral car. Drive force, power, brake force, steering ratio, overhangs and seat are
+engineering choices."""
 
 VOLVO_V40: Final = Car(
     name="volvo-v40",
@@ -92,9 +93,9 @@ VOLVO_V40: Final = Car(
     drivetrain=Drivetrain(max_drive_force=6e3, max_power=110e3, max_brake_force=15.4e3),
     reference_point=(-0.40, -0.36, 0.01),
 )
-"""Mass, axles, yaw inertia, c.g. height, cornering stiffness, steering ratio and 5 deg/g of roll: a public KTH model.
-Engineering choices: sprung mass and its inertias, arm, 1.4 Hz in roll and 1.9 deg/g of pitch at 1.3 Hz (both damped
-with 0.28), drivetrain, seat; width and length of the first V40 (from memory)."""
+"""Mass, axles, yaw inertia, c.g. height, cornering stiffness, steering ratio, 5 deg/g of roll: a public
+KTH model. Engineering choices: sprung mass and its inertias, arm, 1.4 Hz in roll and 1.9 deg/g of pitch
+at 1.3 Hz (both damped with 0.28), drivetrain, seat; width and length of the first V40 (from memory)."""
 
 E_CLASS_SUV: Final = Car(
     name="e-class-suv",
@@ -121,9 +122,9 @@ E_CLASS_SUV: Final = Car(
     drivetrain=Drivetrain(max_drive_force=8e3, max_power=160e3, max_brake_force=20e3, drag_area=0.95),
     reference_point=(-0.27, -0.38, 0.02),
 )
-"""Masses, axles, yaw inertia, c.g. height and cornering stiffness: CarSim data in public repositories; the body's roll
-and pitch inertia are its sprung-mass data (from memory). Engineering choices: arm, 6 deg/g of roll at 1.2 Hz, 2.2 deg/g
-of pitch at 1.3 Hz (both damped with 0.28), friction, drivetrain, body sizes, seat."""
+"""Masses, axles, yaw inertia, c.g. height, cornering stiffness: CarSim data in public repositories; the
+roll and pitch inertia are its sprung-mass data (from memory). Engineering choices: arm, 6 deg/g of roll
+at 1.2 Hz, 2.2 deg/g of pitch at 1.3 Hz (both damped with 0.28), friction, drivetrain, body sizes, seat."""
 
 _FLEET: Final = {car.name: car for car in (SEDAN, BMW_320I, VOLVO_V40, E_CLASS_SUV)}
 

@@ -27,8 +27,8 @@ def _late_driver() -> Driver:
 class SteadyTurn(Maneuver):
     """60 km/h from a straight into a circle to the right of 150 m, and round it (cases EST1 to EST3).
 
-    0.19 g centripetal; the driver sees the bend late and overshoots, so that the side force on him peaks at about
-    0.25 g as the paper reports. There is no calm at the end: the turn lasts.
+    0.19 g centripetal; the driver sees the bend late and overshoots, so that the side force on him peaks at
+    about 0.25 g as the paper reports. There is no calm at the end: the turn lasts.
 
     Args:
         speed: m/s.
@@ -70,7 +70,7 @@ class Braking(Maneuver):
     summary: ClassVar[str] = "0.25 g from 80 km/h to a full stop (the paper's BRK)"
 
     settle: Positive = 2.5
-    calm: Positive = 5.0
+    calm: Positive = 10.0
     speed: Positive = 80.0 * KMH
     deceleration: Positive = 0.25 * GRAVITY
     jerk: Positive = 10.0

@@ -67,7 +67,7 @@ class Path:
 
     @classmethod
     def of_curvature(cls, curvature: ArrayLike, grade: ArrayLike = 0.0) -> Path:
-        """The path with these curvatures (n,), 1/m, and slopes (n,), rad, at every :data:`STEP`, along x at first."""
+        """The path with curvatures (n,), 1/m, and slopes (n,), rad, every :data:`STEP`; along x at first."""
         kappa = np.asarray(curvature, dtype=np.float64)
         slope = np.broadcast_to(np.asarray(grade, dtype=np.float64), kappa.shape)
         heading = _integral(kappa)
@@ -79,12 +79,10 @@ class Path:
         return cls(x, y, heading, kappa, slope.copy(), np.gradient(slope, STEP) if len(slope) > 1 else slope)
 
     @classmethod
-    def of_offset(cls, x: ArrayLike, y: ArrayLike) -> Path:
+    def of_offset(cls, x: Floats, y: Floats) -> Path:
         """The level path through offsets ``y`` (n,) over ``x`` (n,), m, smooth to the curvature."""
         spline = CubicSpline(x, y)
-        stations = np.asarray(x, dtype=np.float64)
-        fine = np.linspace(stations[0], stations[-1], 20 * len(stations))
-        slope = spline(fine, 1)
+        fine = np.linspace(x[0], x[-1], 20 * len(x))
         along = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(fine), np.diff(spline(fine))))))
         at = np.interp(np.arange(0.0, along[-1], STEP), along, fine)
         slope = spline(at, 1)
@@ -94,9 +92,9 @@ class Path:
 
 
 def clothoids(knots: Sequence[tuple[float, float]], length: float) -> Floats:
-    """Curvature every :data:`STEP` up to ``length``: linear between knots (distance in m, curvature in 1/m)."""
+    """Curvature every :data:`STEP` up to ``length``, m: linear between knots (m, 1/m)."""
     stations, curvatures = zip(*knots, strict=True)
-    return np.interp(np.arange(0.0, length + STEP, STEP), stations, curvatures)
+    return np.asarray(np.interp(np.arange(0.0, length + STEP, STEP), stations, curvatures))
 
 
 def bend(curvature: float, angle: float, transition: float) -> Floats:
@@ -110,7 +108,7 @@ def bend(curvature: float, angle: float, transition: float) -> Floats:
     stations = np.arange(0.0, length, STEP)
     shape = np.interp(stations, [0.0, transition, transition + arc, length], [0.0, 1.0, 1.0, 0.0])
     # The sampled curvature, integrated as the path does, turns by exactly the angle.
-    return np.copysign(abs(angle) / (STEP * shape.sum()), curvature) * shape
+    return np.asarray(np.copysign(abs(angle) / (STEP * shape.sum()), curvature) * shape)
 
 
 def smooth_steps(stations: Floats, knots: ArrayLike, values: Sequence[float]) -> Floats:

@@ -100,7 +100,7 @@ def random_drives(
     drives: RandomDrives | None = None,
     device: str = "cpu",
 ) -> list[CueTrace]:
-    """``n`` random drives in one launch; row i is ``random_drive(drive_seeds(n, seed)[i], duration, ...)``."""
+    """``n`` random drives in one launch; number i is ``random_drive(drive_seeds(n, seed)[i], ...)``."""
     source = drives or RandomDrives()
     return simulate([source.plan(one, duration, kind, car) for one in drive_seeds(n, seed)], device)
 

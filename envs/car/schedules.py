@@ -17,7 +17,7 @@ DT: Final = 0.01
 """Time step of schedules and of the cues, s."""
 
 HOLD: Final = 0.8
-"""Deceleration the brake of a standing car would make, and that of the last moment before it stands, m/s^2."""
+"""Deceleration that the brake of a standing car would make; a gentle stop ends with it. In m/s^2."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Speed, m/s, and acceleration, m/s^2, every :data:`DT`; where the speed is 0 the acceleration is the brake's."""
+    """Speed, m/s, and acceleration, m/s^2, every :data:`DT`; at speed 0 the acceleration is the brake's."""
 
     speed: Floats
     acceleration: Floats

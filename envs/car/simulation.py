@@ -36,7 +36,8 @@ class Plan:
         car: Which car.
         path: The line to follow.
         schedule: The speed over time.
-        steering: (n,) steering-wheel angles, rad, instead of following the path; one a sample of the schedule.
+        steering: (n,) steering-wheel angles, rad, instead of following the path; one a sample of the
+            schedule.
         driver: Who drives; the default driver, or a :data:`ROBOT` where ``steering`` is given.
         source: For reports.
     """
@@ -77,8 +78,9 @@ def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
 
     Returns:
         One trace a plan, sampled at 100 Hz, at the origin of F_A, with the channels
-        :data:`~.drive_kernel.COLUMNS`: accelerations are those of the point of the roll axis under the c.g., in
-        the road's frame; ``path_offset_m`` is the distance to the right of the path; throttle and brake are shares.
+        :data:`~.drive_kernel.COLUMNS`: accelerations are those of the point of the roll axis under the c.g.,
+        in the road's frame; ``path_offset_m`` is the distance to the right of the path; throttle and brake
+        are shares.
 
     Raises:
         DataError: the car left the range of the model (a plan no car can follow).
@@ -145,7 +147,7 @@ def _trace(plan: Plan, rows: Floats) -> CueTrace:
         )
     return CueTrace(
         name=plan.name,
-        time=DT * np.arange(len(rows)),
+        time=np.asarray(DT * np.arange(len(rows)), dtype=np.float64),
         specific_force=rows[:, 0:3],
         angular_velocity=rows[:, 3:6],
         angular_acceleration=rows[:, 6:9],

@@ -82,7 +82,7 @@ def _reachable(limit: Floats, style: Style, stops: Sequence[int]) -> Floats:
         square[i] = min(square[i], square[i - 1] + gain)
     for i in range(len(square) - 2, -1, -1):
         square[i] = min(square[i], square[i + 1] + loss)
-    return np.sqrt(np.array(square))
+    return np.asarray(np.sqrt(np.array(square)))
 
 
 def _smoothed(speed: Floats) -> Schedule:

@@ -23,8 +23,8 @@ Floats = NDArray[np.float64]
 class StepSteer(Maneuver):
     """ISO 7401: the wheel is turned to the right at a constant rate, held, and turned back.
 
-    The angle is that of a steady turn with the wanted acceleration in the linear range, i (L / R + K a_y). The
-    standard ends with the hold; turning back is added, so that the drive ends in calm.
+    The angle is that of a steady turn with the wanted acceleration in the linear range, i (L / R + K a_y).
+    The standard ends with the hold; turning back is added, so that the drive ends in calm.
 
     Args:
         speed: m/s.
@@ -57,9 +57,9 @@ class StepSteer(Maneuver):
 class SineWithDwell(Maneuver):
     """FMVSS 126: one sine of steering at 0.7 Hz with a pause of 0.5 s at its second peak.
 
-    The amplitude is a multiple of the angle that gives 0.3 g in a steady turn (linear range). The standard raises the
-    multiple until 6.5 and tests stability control, which these cars do not have; the default stays where all of them
-    remain controllable. The speed is kept, where the standard lets the throttle go.
+    The amplitude is a multiple of the angle that gives 0.3 g in a steady turn (linear range). The standard
+    raises the multiple until 6.5 and tests stability control, which these cars do not have; the default stays
+    where all of them remain controllable. The speed is kept, where the standard lets the throttle go.
 
     Args:
         speed: m/s.
@@ -88,5 +88,6 @@ class SineWithDwell(Maneuver):
         amplitude = self.multiple * car.steering_wheel_for(self.speed, 0.3 * GRAVITY)
         duration = self.settle + 1.0 / self.frequency + self.dwell + self.calm
         schedule = Schedule.of(self.speed, [Hold(duration)])
-        steering = amplitude * self.wave(DT * np.arange(len(schedule)) - self.settle)
+        time = np.asarray(DT * np.arange(len(schedule)) - self.settle, dtype=np.float64)
+        steering = amplitude * self.wave(time)
         return Plan(self.name, car, straight(), schedule, steering=steering)

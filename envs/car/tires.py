@@ -1,6 +1,9 @@
 """Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill (Warp)."""
+# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
+
+import math
 
 import warp as wp
 
@@ -9,7 +12,7 @@ from ..precision import real
 wp.set_module_options({"enable_backward": False})
 
 _LEAST_CAPACITY = 0.05
-"""Share of the friction that stays lateral when all of it is used longitudinally (a locked wheel still resists)."""
+"""Share of the friction that stays lateral when all of it is used longitudinally."""
 
 
 @wp.struct
@@ -43,6 +46,13 @@ def lateral_force(axle: Axle, friction: real, shape: real, slip: real) -> real:
 
 
 @wp.func
+def slip_for(force: real, capacity: real, stiffness: real, shape: real) -> real:
+    """(C2) inverted: the slip angle that gives this lateral force, held at 95 % of the capacity, rad."""
+    share = wp.clamp(force / capacity, real(-0.95), real(0.95))
+    return shape * capacity / stiffness * wp.tan(wp.asin(share) / shape)
+
+
+@wp.func
 def slip_rate(slip: real, along: real, across: real, relaxation_length: real) -> real:
     """(C3) Relaxation sigma dalpha/dt + |v_x| alpha = -v_y (Bernard and Clover 1995), 1/s.
 
@@ -53,10 +63,10 @@ def slip_rate(slip: real, along: real, across: real, relaxation_length: real) ->
 
 @wp.func
 def damped_slip(slip: real, along: real, across: real, low_speed: real, damping: real) -> real:
-    """(C4) Slip with the damping that a standing tire needs, fading out at ``low_speed`` (Pacejka 2012, ch. 8)."""
+    """(C4) Slip with the damping a standing tire needs, fading out at ``low_speed`` (Pacejka 2012, ch. 8)."""
     speed = wp.abs(along)
     result = slip
     if speed < low_speed:
-        weight = real(0.5) * (real(1.0) + wp.cos(real(wp.pi) * speed / low_speed))
+        weight = real(0.5) * (real(1.0) + wp.cos(real(math.pi) * speed / low_speed))
         result = slip - damping * weight * across
     return result

@@ -37,7 +37,11 @@ class Acceleration(Maneuver):
 
     def plan(self, car: Car) -> Plan:
         """Straight on, standing, accelerating, steady."""
-        phases = [Hold(self.settle), Change(self.speed, self.acceleration, self.jerk), Hold(self.calm)]
+        phases: list[Hold | Change] = [
+            Hold(self.settle),
+            Change(self.speed, self.acceleration, self.jerk),
+            Hold(self.calm),
+        ]
         return Plan(self.name, car, straight(), Schedule.of(0.0, phases))
 
 

@@ -1,8 +1,9 @@
 """Single-track car with roll, pitch and actuators: its parameters, state and equations of motion (Warp).
 
-The equations carry the tags of docs/car.md. Velocities are those of the point B of the roll axis under the c.g.,
-in the plane of the road: x forward, y right, z down.
+The equations carry the tags of docs/car.md. Velocities are those of the point B of the roll axis under the
+c.g., in the plane of the road: x forward, y right, z down.
 """
+# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 
@@ -137,6 +138,7 @@ def solve_pair(mass: real, coupling: real, inertia: real, force: real, moment: r
 
 @wp.func
 def front_axle(car: CarParameters, load: real, state: State, command: Commands) -> Axle:
+    """Load, longitudinal force and stiffness of the front axle; the force is held within friction."""
     axle = Axle()
     static = car.mass * real(GRAVITY) * car.rear_axle / (car.front_axle + car.rear_axle)
     force = state[DRIVE] * car.drive_front_share - command.resistance * car.brake_front_share
@@ -148,6 +150,7 @@ def front_axle(car: CarParameters, load: real, state: State, command: Commands) 
 
 @wp.func
 def rear_axle(car: CarParameters, load: real, state: State, command: Commands) -> Axle:
+    """The same of the rear axle."""
     axle = Axle()
     static = car.mass * real(GRAVITY) * car.front_axle / (car.front_axle + car.rear_axle)
     force = state[DRIVE] * (real(1.0) - car.drive_front_share)
@@ -215,8 +218,8 @@ def derivative(car: CarParameters, state: State, command: Commands) -> State:
     forces = tire_forces(car, state, command)
     moments = body_moments(car, state, normal_gravity(command, u))
 
-    # (C10) The body's roll and pitch accelerations react on the car's. The slope's share of gravity acts on every
-    # mass alike, so that it drops out of the coupling.
+    # (C10) The body's roll and pitch accelerations react on the car's. The slope's share of gravity acts on
+    # every mass alike, so that it drops out of the coupling.
     arm = car.sprung_mass * car.arm
     roll_inertia = car.roll_inertia + arm * car.arm
     pitch_inertia = car.pitch_inertia + arm * car.arm
@@ -259,8 +262,8 @@ def runge_kutta(car: CarParameters, state: State, command: Commands, dt: real) -
 def resist(car: CarParameters, deflection: real, state: State, command: Commands, dt: real) -> vec2:
     """(C8) Brakes and rolling resistance as an elastic, perfectly plastic element (Prandtl's; Dahl 1968).
 
-    Sliding, it gives its full force; standing, it is a damped spring, so that a stop ends with a jerk, does not
-    chatter, and a slope is held. Returns the new deflection, m, and the force, N.
+    Sliding, it gives its full force; standing, it is a damped spring, so that a stop ends with a jerk, does
+    not chatter, and a slope is held. Returns the new deflection, m, and the force, N.
     """
     most = most_resistance(car, state[BRAKE], command, state[FORWARD])
     stiffness = car.mass * car.standstill_stiffness

@@ -135,8 +135,9 @@ class Car:
         tires: Both axles.
         drivetrain: Drive, brakes, resistances.
         steering: Steering gear.
-        reference_point: Origin of F_A, where cues are given, from the c.g., m. The default is the seat (H-point)
-            of a driver on the left, 1.45 m behind the front axle and 0.5 m above the road (engineering choice).
+        reference_point: Origin of F_A, where cues are given, from the c.g., m. The default is the seat
+            (H-point) of a driver on the left, 1.45 m behind the front axle and 0.5 m above the road
+            (engineering choice).
     """
 
     name: str
