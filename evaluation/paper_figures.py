@@ -1,0 +1,111 @@
+"""Figures 5 to 9 of the paper: the same axes and curves."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..envs.cues import GRAVITY
+from .figure_style import CAR, new_figure, png, styled
+from .paper_checks import Drives, predicted_ripple
+from .trajectory import Floats
+
+_TURNS = ("EST1", "EST2", "EST3")
+_ARROW_EVERY = 2.0
+"""Seconds between the arrows that show where the cab points."""
+
+
+def paper_figures(drives: Drives) -> dict[str, bytes]:
+    """PNG of each figure by its caption."""
+    with styled():
+        return {
+            "Figure 5: driver's lateral specific force, entry and steady turn": png(_lateral_force(drives)),
+            "Figure 6: simulator trajectories for EST1, EST2 and EST3": png(_trajectories(drives)),
+            "Figure 7: yaw rate, entry and steady turn": png(_yaw_rate(drives)),
+            "Figure 8: driver's longitudinal specific force, braking": png(_braking(drives)),
+            "Figure 9: driver's lateral specific force, single lane change": png(_lane_change(drives)),
+        }
+
+
+def _curves(axes: Axes, time: Floats, car: Floats, simulators: dict[str, Floats], unit: str) -> None:
+    axes.plot(time, car, color=CAR, label="car")
+    for name, values in simulators.items():
+        axes.plot(time, values, label=name)
+    axes.set_xlabel("time, s")
+    axes.set_ylabel(unit)
+    axes.legend()
+
+
+def _in_g(axes: Axes) -> None:
+    axes.secondary_yaxis("right", functions=(lambda f: f / GRAVITY, lambda f: f * GRAVITY)).set_ylabel("g")
+
+
+def _lateral_force(drives: Drives) -> Figure:
+    figure = new_figure(8.0, 4.2)
+    axes = figure.subplots()
+    first = drives["EST1"]
+    _curves(
+        axes, first.time, first.f_wanted[:, 1], {n: drives[n].f_felt[:, 1] for n in _TURNS}, "$f_y$, m/s²"
+    )
+    _in_g(axes)
+    return figure
+
+
+def _trajectories(drives: Drives) -> Figure:
+    figure = new_figure(9.0, 4.6)
+    for axes, name in zip(figure.subplots(1, 3, sharex=True, sharey=True), _TURNS, strict=True):
+        t = drives[name]
+        axes.plot(t.carriage[:, 1], t.carriage[:, 0])
+        every = np.arange(0, len(t.time), round(_ARROW_EVERY / 0.01))
+        heading = t.turntable[every] + t.hexapod[every, 5]
+        axes.quiver(
+            t.carriage[every, 1], t.carriage[every, 0], np.sin(heading), np.cos(heading),
+            color=CAR, scale=9.0, width=0.008, zorder=3,
+        )  # fmt: skip
+        axes.set_title(name)
+        axes.set_aspect("equal")
+        axes.set_xlabel("carriage y, m")
+    figure.axes[0].set_ylabel("carriage x, m")
+    figure.suptitle("Arrows: where the cab points, every 2 s", x=0.01, ha="left", fontsize=8.5)
+    return figure
+
+
+def _yaw_rate(drives: Drives) -> Figure:
+    figure = new_figure(8.0, 5.6)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.5, 1.0))
+    first, second = drives["EST1"], drives["EST2"]
+    rates = {name: np.rad2deg(drives[name].w_felt[:, 2]) for name in _TURNS}
+    _curves(upper, first.time, np.rad2deg(first.w_wanted[:, 2]), rates, "yaw rate, deg/s")
+    upper.set_xlabel("")
+    lower.plot(
+        second.time,
+        np.rad2deg(second.w_felt[:, 2] - second.w_wanted[:, 2]),
+        color="C1",
+        label="EST2 less car",
+    )
+    lower.plot(second.time, np.rad2deg(predicted_ripple(second)), color=CAR, linestyle=":", label="Eq. (54)")
+    lower.set_ylim(-0.6, 0.6)
+    lower.set_xlabel("time, s")
+    lower.set_ylabel("false yaw rate, deg/s")
+    lower.legend()
+    return figure
+
+
+def _braking(drives: Drives) -> Figure:
+    figure = new_figure(8.0, 4.2)
+    axes = figure.subplots()
+    t = drives["BRK"]
+    _curves(axes, t.time, t.f_wanted[:, 0], {"BRK": t.f_felt[:, 0]}, "$f_x$, m/s²")
+    _in_g(axes)
+    return figure
+
+
+def _lane_change(drives: Drives) -> Figure:
+    figure = new_figure(8.0, 4.2)
+    axes = figure.subplots()
+    t = drives["LC1"]
+    simulators = {name: drives[name].f_felt[:, 1] for name in ("LC1", "LC2")}
+    _curves(axes, t.time, t.f_wanted[:, 1], simulators, "$f_y$, m/s²")
+    _in_g(axes)
+    return figure
