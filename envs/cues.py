@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DataError
-from .storage import write_text
+from .storage import write_bytes, write_text
 
 Floats = NDArray[np.float64]
 
@@ -126,16 +128,32 @@ class CueTrace:
             channels={key: at(value) for key, value in self.channels.items()},
         )
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the trace as CSV: :data:`CSV_COLUMNS`, then the channels, one row a sample."""
+    def to_csv(self, path: str | Path, decimals: int | None = None) -> None:
+        """Write the trace as CSV: :data:`CSV_COLUMNS`, then the channels, one row a sample.
+
+        Args:
+            path: A name that ends in ``.gz`` is packed; the same trace always gives the same bytes.
+            decimals: Digits after the point; nine significant digits if not given.
+        """
+        number = "{:.9g}" if decimals is None else f"{{:.{decimals}f}}"
         body = np.column_stack(
-            [self.time, self.specific_force, self.angular_velocity, *(self.channels[k] for k in self.channels)]
+            [
+                self.time,
+                self.specific_force,
+                self.angular_velocity,
+                *(self.channels[k] for k in self.channels),
+            ]
         )
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow([*CSV_COLUMNS, *self.channels])
-        writer.writerows([[f"{value:.9g}" for value in row] for row in body])
-        write_text(path, buffer.getvalue())
+        # Adding 0.0 after rounding turns -0.0 into 0.0.
+        body = body if decimals is None else np.round(body, decimals) + 0.0
+        writer.writerows([[number.format(value) for value in row] for row in body])
+        if str(path).endswith(".gz"):
+            write_bytes(path, gzip.compress(buffer.getvalue().encode(), mtime=0))
+        else:
+            write_text(path, buffer.getvalue())
 
     @classmethod
     def from_csv(cls, path: str | Path, name: str | None = None) -> CueTrace:
@@ -152,7 +170,7 @@ class CueTrace:
                 "`motion-cueing import` converts a log with other columns"
             )
         return cls(
-            name=name or Path(path).stem,
+            name=name or Path(path).name.removesuffix(".gz").removesuffix(".csv"),
             time=table[CSV_COLUMNS[0]],
             specific_force=np.stack([table[column] for column in CSV_COLUMNS[1:4]], axis=1),
             angular_velocity=np.stack([table[column] for column in CSV_COLUMNS[4:7]], axis=1),
@@ -162,32 +180,40 @@ class CueTrace:
 
 
 def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, Floats]:
-    """Numeric columns of a CSV file with a header row, by name; all of them, or those named.
+    """Numeric columns of a CSV file (or ``.gz``) with a header row, by name; all, or those named.
 
     Empty cells become NaN.
 
     Raises:
         DataError: the file cannot be read, is empty, has ragged rows or a cell that is no number.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read ({error})") from None
-    rows = [row for row in csv.reader(io.StringIO(text)) if row]
-    if len(rows) < 2:
-        raise DataError(f"{path}: empty; expected a header row and data rows")
-    header = [cell.strip() for cell in rows[0]]
-    repeated = {name for name in header if header.count(name) > 1}
-    if repeated:
-        raise DataError(f"{path}: column {', '.join(sorted(repeated))} occurs more than once")
-    for number, row in enumerate(rows[1:], start=2):
-        if len(row) != len(header):
-            raise DataError(f"{path}: row {number} has {len(row)} cells, the header has {len(header)}")
+    header, rows = _read_rows(path)
     wanted = header if columns is None else columns
     missing = [name for name in wanted if name not in header]
     if missing:
         raise DataError(f"{path}: missing column {', '.join(missing)}; found {', '.join(header)}")
-    return {name: _numbers(path, name, [row[header.index(name)] for row in rows[1:]]) for name in wanted}
+    return {name: _numbers(path, name, [row[header.index(name)] for row in rows]) for name in wanted}
+
+
+def _read_rows(path: str | Path) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a CSV file, all of one length."""
+    try:
+        content = Path(path).read_bytes()
+        text = (gzip.decompress(content) if str(path).endswith(".gz") else content).decode("utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""))
+        rows = [(reader.line_num, row) for row in reader if row]
+    except (OSError, EOFError, zlib.error, csv.Error, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: cannot be read ({error})") from None
+    if len(rows) < 2:
+        raise DataError(f"{path}: empty; expected a header row and data rows")
+    header = [cell.strip() for cell in rows[0][1]]
+    repeated = {name for name in header if header.count(name) > 1}
+    if repeated:
+        raise DataError(f"{path}: column {', '.join(sorted(repeated))} occurs more than once")
+    for line, row in rows[1:]:
+        if len(row) != len(header):
+            raise DataError(f"{path}: line {line} has {len(row)} cells, the header has {len(header)}")
+    return header, [row for _, row in rows[1:]]
 
 
 def _numbers(path: str | Path, name: str, cells: list[str]) -> Floats:
@@ -202,7 +228,9 @@ def _checked(trace: str, label: str, values: ArrayLike, shape: tuple[int | None,
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise DataError(f"{trace}: {label} is not an array of numbers") from None
-    if len(array.shape) != len(shape) or any(w not in (None, h) for w, h in zip(shape, array.shape, strict=True)):
+    if len(array.shape) != len(shape) or any(
+        w not in (None, h) for w, h in zip(shape, array.shape, strict=True)
+    ):
         wanted = "(" + ", ".join("n" if w is None else str(w) for w in shape) + ")"
         raise DataError(f"{trace}: {label} has shape {array.shape}, expected {wanted}")
     bad = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))

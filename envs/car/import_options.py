@@ -1,0 +1,66 @@
+"""Choices of an import: the rate, the filter, gaps, and what shall not be estimated."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic.dataclasses import dataclass
+
+from ..settings import STRICT, NonNegative, Positive, Vector3
+
+Sign = Literal["estimate", "keep", "flip"]
+
+
+@dataclass(frozen=True, config=STRICT)
+class ImportOptions:
+    """How a log becomes cues. Angles are in degrees because a person types them."""
+
+    rate_hz: Positive = 100.0
+    """Sample rate of the result, Hz."""
+
+    cutoff_hz: Positive = 5.0
+    """Cut-off of the zero-phase low-pass on force and rates, Hz. Driving itself ends near 3 Hz;
+    what is above is road, engine and the holder of the device."""
+
+    start_s: NonNegative = 0.0
+    """What comes earlier in the log is left out, s from its first stamp."""
+
+    end_s: Positive | None = None
+    """What comes later in the log is left out, s from its first stamp."""
+
+    gaps: Literal["refuse", "bridge"] = "refuse"
+    """Refuse missing data (long steps, repeated stamps, empty cells), or bridge it by interpolation."""
+
+    longest_step_s: Positive = 0.2
+    """A longer step between samples is a gap, s."""
+
+    longest_gap_s: Positive = 2.0
+    """A longer gap is refused even when bridging, s."""
+
+    standstill_m_s: NonNegative = 0.3
+    """The car counts as standing below this speed, m/s."""
+
+    roll_deg: float | None = None
+    """Roll of the device in the car, right side down positive; estimated from gravity if not given."""
+
+    pitch_deg: float | None = None
+    """Pitch of the device in the car, nose up positive; estimated from gravity if not given."""
+
+    yaw_deg: float | None = None
+    """Yaw of the device in the car, to the right positive; estimated from dv/dt and v r if not given."""
+
+    lateral_sign: Sign = "estimate"
+    """Whether the lateral axis is mirrored (left-handed force axes); estimated from v r."""
+
+    rate_sign: Sign = "estimate"
+    """Whether the angular rates are reversed; estimated from the course, if there is one."""
+
+    gravity_m_s2: Positive | None = None
+    """Gravity as the device measures it; estimated if not given. The difference to 9.81 is taken as a
+    bias of the vertical axis."""
+
+    rate_bias_deg_s: Vector3 | None = None
+    """Bias of the rates about the car's axes; estimated if not given."""
+
+    speed_delay_s: float | None = None
+    """How long the speed lags behind the force; estimated if not given, s."""
