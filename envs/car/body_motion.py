@@ -7,7 +7,7 @@ import warp as wp
 
 from ..cues import GRAVITY
 from ..precision import mat33, real, vec3
-from .vehicle_model import (
+from .vehicle_state import (
     FORWARD,
     LATERAL,
     PITCH,

@@ -13,7 +13,8 @@ from .body_motion import Cue, Slope, cues
 from .driver import DriverParameters, Errors, SpeedTarget, force_command, most_drive, wheel_command
 from .paths import STEP
 from .schedules import DT
-from .vehicle_model import (
+from .vehicle_model import air_drag, derivative, resist, runge_kutta
+from .vehicle_state import (
     DRIVE,
     FORWARD,
     HEADING,
@@ -26,10 +27,6 @@ from .vehicle_model import (
     State,
     X,
     Y,
-    air_drag,
-    derivative,
-    resist,
-    runge_kutta,
 )
 
 wp.set_module_options({"enable_backward": False})
@@ -102,10 +99,13 @@ def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
     flat = wp.cos(here[4])
     road.x = here[0] + flat * (inside * wp.cos(middle) + outside * wp.cos(road.heading))
     road.y = here[1] + flat * (inside * wp.sin(middle) + outside * wp.sin(road.heading))
-    weight = inside / real(STEP)
-    road.slope.grade = here[4] + (there[4] - here[4]) * weight
-    road.slope.per_metre = here[5] + (there[5] - here[5]) * weight
-    road.slope.per_square_metre = (there[5] - here[5]) / real(STEP)
+    steepening = (there[5] - here[5]) / real(STEP)
+    road.slope.grade = here[4] + here[5] * inside + real(0.5) * steepening * inside * inside
+    road.slope.per_metre = here[5] + steepening * inside
+    road.slope.per_square_metre = steepening
+    if outside != real(0.0):
+        road.slope.per_metre = real(0.0)
+        road.slope.per_square_metre = real(0.0)
     return road
 
 

@@ -10,13 +10,8 @@ from ..cues import GRAVITY
 from ..precision import real
 from ..settings import STRICT, NonNegative, Positive
 from .tires import slip_for
-from .vehicle_model import (
-    FORWARD,
-    LATERAL,
-    CarParameters,
-    State,
-    air_drag,
-)
+from .vehicle_model import air_drag
+from .vehicle_state import FORWARD, LATERAL, CarParameters, State
 
 wp.set_module_options({"enable_backward": False})
 

@@ -69,14 +69,16 @@ class Path:
     def of_curvature(cls, curvature: ArrayLike, grade: ArrayLike = 0.0) -> Path:
         """The path with curvatures (n,), 1/m, and slopes (n,), rad, every :data:`STEP`; along x at first."""
         kappa = np.asarray(curvature, dtype=np.float64)
-        slope = np.broadcast_to(np.asarray(grade, dtype=np.float64), kappa.shape)
+        change = np.gradient(np.broadcast_to(np.asarray(grade, dtype=np.float64), kappa.shape), STEP)
+        # The slope is the exact integral of its (piecewise linear) derivative, as the kernel reads it.
+        slope = np.ravel(grade)[0] + _integral(change)
         heading = _integral(kappa)
         # Exact for an arc: the chord has the mean heading, and sinc(dpsi / 2) of the arc's length.
         middle, turn = 0.5 * (heading[1:] + heading[:-1]), np.diff(heading)
         chord = STEP * np.sinc(turn / (2.0 * np.pi)) * np.cos(0.5 * (slope[1:] + slope[:-1]))
         x = np.concatenate(([0.0], np.cumsum(chord * np.cos(middle))))
         y = np.concatenate(([0.0], np.cumsum(chord * np.sin(middle))))
-        return cls(x, y, heading, kappa, slope.copy(), np.gradient(slope, STEP) if len(slope) > 1 else slope)
+        return cls(x, y, heading, kappa, slope, change)
 
     @classmethod
     def of_offset(cls, x: Floats, y: Floats) -> Path:

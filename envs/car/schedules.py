@@ -95,7 +95,7 @@ def _change(start: float, phase: Change) -> Floats:
             "a speed change needs positive acceleration and jerk and a speed not below 0"
         )
     change, sign = abs(phase.speed - start), np.sign(phase.speed - start)
-    if change == 0.0:
+    if change < 1e-9:
         return np.zeros((2, 0))
     top = min(phase.acceleration, float(np.sqrt(2.0 * change / (1.0 / phase.jerk + 1.0 / release))))
     rise, fall = top / phase.jerk, top / release

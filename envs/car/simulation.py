@@ -18,7 +18,7 @@ from .drive_kernel import COLUMNS, SUBSTEPS, Row, Task, drive_all, vec4
 from .driver import Driver, DriverParameters
 from .paths import Path, clothoids
 from .schedules import DT, Schedule
-from .vehicle_model import CarParameters
+from .vehicle_state import CarParameters
 from .vehicles import Car
 
 Floats = NDArray[np.float64]
