@@ -99,12 +99,7 @@ class Simulator:
             step_forward,
             self.n,
             inputs=[
-                self.machines,
-                self._perception,
-                self._drives,
-                self.machine_of,
-                self._drive_of,
-                real(self.dt),
+                *self.constants,
                 self._states[begin],
                 self._delays[begin],
                 self.action_array,
@@ -113,6 +108,23 @@ class Simulator:
             device=self.device,
             record_cmd=True,
         )
+
+    @property
+    def constants(self) -> list[Any]:
+        """The first arguments of every step kernel: machines, perception, drives, who has which, time step."""
+        return [
+            self.machines,
+            self._perception,
+            self._drives,
+            self.machine_of,
+            self._drive_of,
+            real(self.dt),
+        ]
+
+    @property
+    def delay_array(self) -> Any:
+        """The Warp array (n, depth) of earlier set-points now."""
+        return self._delays[self._now]
 
     @property
     def state_array(self) -> Any:
@@ -163,11 +175,7 @@ class Simulator:
             reset_forward,
             self.n,
             inputs=[
-                self.machines,
-                self._perception,
-                self._drives,
-                self.machine_of,
-                self._drive_of,
+                *self.constants[:-1],
                 wp.array(samples, dtype=int, device=self.device),
                 wp.array(poses, dtype=vec9, device=self.device),
                 wp.array(chosen, dtype=wp.bool, device=self.device),

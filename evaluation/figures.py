@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from ..envs.platform import ACTUATORS
 from .criteria import Criteria
 from .figure_style import CAR, LIMIT, limit_lines, line_styles, new_figure, png, styled
-from .metrics import AXES, cab_motion, cue_error, tilt_rate
+from .metrics import CUE_AXES, cab_motion, cue_error, tilt_rate
 from .trajectory import Floats, Trajectory
 
 _CUES = (
@@ -71,7 +71,7 @@ def _cue(axes: Axes, drives: Drives, styles: Styles, i: int) -> None:
         axes.plot(drive.time, factor * cab_motion(drive)[1][:, i], label=name, **styles[name])
     car = next(iter(drives.values()))
     axes.plot(car.time, factor * cab_motion(car)[0][:, i], color=CAR, linewidth=1.6, label="car", zorder=1.9)
-    _widen(axes, 1.0 if AXES[i].startswith("f") else 5.0)
+    _widen(axes, 1.0 if CUE_AXES[i].startswith("f") else 5.0)
     _label(axes, title, unit)
 
 

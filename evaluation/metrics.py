@@ -14,7 +14,7 @@ from . import signals
 from .criteria import Criteria
 from .trajectory import AT_ACCELERATION, AT_DISPLACEMENT, AT_VELOCITY, Floats, Trajectory
 
-AXES: Final = ("f_x", "f_y", "f_z", "w_x", "w_y", "w_z")
+CUE_AXES: Final = ("f_x", "f_y", "f_z", "w_x", "w_y", "w_z")
 """Specific force (m/s^2) and angular velocity (rad/s) in the cab's axes."""
 
 _REST: Final = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
@@ -77,7 +77,7 @@ class Metrics:
         duration: Length of the drive, s.
         cue_error: J, the headline: squared error over the indifference zone, averaged; 0 is perfect.
         perceived_cue_error: J of the sensed signals.
-        axes: By :data:`AXES`.
+        axes: By :data:`CUE_AXES`.
         false_cues: Share of time with a false cue on any axis.
         missing_cues: Share of time with a missing cue on any axis.
         tilt_rate_peak: Largest roll and pitch rate beyond the car's own, rad/s.
@@ -151,14 +151,14 @@ def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics
 
 
 def cab_motion(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """Wanted and felt motion at the cab point, (n, 6) by :data:`AXES`, zero at rest on level ground."""
+    """Wanted and felt motion at the cab point, (n, 6) by :data:`CUE_AXES`, zero at rest on level ground."""
     wanted = np.column_stack([trajectory.f_wanted, trajectory.w_wanted]) - _REST
     felt = np.column_stack([trajectory.f_felt, trajectory.w_felt]) - _REST
     return wanted, felt
 
 
 def sensed_motion(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """Sensed motion in car and simulator, (n, 6) by :data:`AXES`, zero at rest on level ground."""
+    """Sensed motion in car and simulator, (n, 6) by :data:`CUE_AXES`, zero at rest on level ground."""
     wanted = np.column_stack([trajectory.sensed_f_wanted, trajectory.sensed_w_wanted]) - _REST
     felt = np.column_stack([trajectory.sensed_f_felt, trajectory.sensed_w_felt]) - _REST
     return wanted, felt
@@ -168,7 +168,7 @@ def cue_error(wanted: Floats, felt: Floats, criteria: Criteria | None = None) ->
     """(n,) |df|^2 / (0.6 m/s^2)^2 + |dw|^2 / (3 deg/s)^2, whose mean over time is J.
 
     Args:
-        wanted: (n, 6) by :data:`AXES`.
+        wanted: (n, 6) by :data:`CUE_AXES`.
         felt: (n, 6) the same of the simulator.
         criteria: The indifference zone.
     """
@@ -188,7 +188,7 @@ def tilt_rate(trajectory: Trajectory) -> Floats:
 
 def _axes(trajectory: Trajectory, criteria: Criteria) -> dict[str, AxisMetrics]:
     motions = np.stack([*cab_motion(trajectory), *sensed_motion(trajectory)])
-    return {axis: _axis(motions[:, :, i], trajectory.dt, criteria, i) for i, axis in enumerate(AXES)}
+    return {axis: _axis(motions[:, :, i], trajectory.dt, criteria, i) for i, axis in enumerate(CUE_AXES)}
 
 
 def _axis(motions: Floats, dt: float, criteria: Criteria, i: int) -> AxisMetrics:

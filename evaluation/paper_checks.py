@@ -70,6 +70,7 @@ def steady(trajectory: Trajectory, values: Floats) -> Floats:
 def all_checks(drives: Drives) -> list[Check]:
     """Every statement, case by case."""
     return [
+        *(within_limits(case, drives[case]) for case in drives),
         *entry_and_turn(drives["EST1"]),
         *opened_yaw(drives["EST1"], drives["EST2"]),
         *without_turntable(drives["EST1"], drives["EST3"]),
@@ -77,6 +78,12 @@ def all_checks(drives: Drives) -> list[Check]:
         *full_lane_change(drives["LC1"]),
         *reduced_lane_change(drives["LC1"], drives["LC2"]),
     ]
+
+
+def within_limits(case: str, t: Trajectory) -> Check:
+    """No limit of the hardware is met."""
+    share = float(t.limits_active.any(axis=1).mean())
+    return Check(case, "share of time at a limit", "within its physical limitations", share, "", 0.0, 0.0)
 
 
 def entry_and_turn(t: Trajectory) -> list[Check]:
@@ -169,7 +176,6 @@ def braking(t: Trajectory) -> list[Check]:
         Check("BRK", "false cue after the stop", "a large false cue", false_cue, "g", 0.05, 0.25),
         Check("BRK", "carriage travel used", "21 m", travel, "m", 19.0, 23.0),
         Check("BRK", "farthest carriage position", "within 13.72 m", reach, "m", 0.0, 13.72),
-        Check("BRK", "share of time at a limit", "inside the limits", float(t.limits_active.any(axis=1).mean()), "", 0.0, 0.0),
     ]  # fmt: skip
 
 

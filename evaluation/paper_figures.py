@@ -29,7 +29,7 @@ def paper_figures(drives: Drives) -> dict[str, bytes]:
 
 
 def _curves(axes: Axes, time: Floats, car: Floats, simulators: dict[str, Floats], unit: str) -> None:
-    axes.plot(time, car, color=CAR, label="car")
+    axes.plot(time, car, color=CAR, linewidth=3.0, alpha=0.45, label="car")
     for name, values in simulators.items():
         axes.plot(time, values, label=name)
     axes.set_xlabel("time, s")

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from .metrics import AXES, Metrics
+from .metrics import CUE_AXES, Metrics
 from .results import Results
 
 NOTHING: Final = "–"
@@ -123,7 +123,7 @@ def axis_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
         "perceived RMSE",
         "perceived part",
     )
-    rows = [_axis_row(name, axis, drives[name]) for name in drives for axis in AXES]
+    rows = [_axis_row(name, axis, drives[name]) for name in drives for axis in CUE_AXES]
     return TextTable(f"{maneuver}: axes", header, tuple(rows))
 
 

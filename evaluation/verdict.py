@@ -14,7 +14,7 @@ from typing import Final, Literal
 from pydantic.dataclasses import dataclass
 
 from ..envs.settings import STRICT
-from .metrics import AXES, Metrics
+from .metrics import CUE_AXES, Metrics
 
 Cause = Literal["false", "missing", "shape"]
 CAUSES: Final[tuple[Cause, ...]] = ("false", "missing", "shape")
@@ -123,7 +123,7 @@ def terms(metrics: Metrics) -> Terms:
 def advantage(of: Terms, name: str, over: Terms) -> Advantage:
     """Why the J of the terms ``of`` is lower than that of ``over``, which belongs to the policy ``name``."""
     gain = {key: over[key] - of[key] for key in over}
-    by_axis = {axis: sum(gain[axis, cause] for cause in CAUSES) for axis in AXES}
+    by_axis = {axis: sum(gain[axis, cause] for cause in CAUSES) for axis in CUE_AXES}
     total, theirs = sum(gain.values()), sum(over.values())
     if total <= 0.0:
         return Advantage(name, theirs, 0.0, None, None, None, None, None)
@@ -201,7 +201,7 @@ def _standing(name: str, drives: Mapping[str, Mapping[str, Metrics]], wins: int)
 
 def _mean_terms(drives: Mapping[str, Mapping[str, Metrics]], name: str) -> Terms:
     every = [terms(policies[name]) for policies in drives.values()]
-    return {key: _mean(parts[key] for parts in every) for key in product(AXES, CAUSES)}
+    return {key: _mean(parts[key] for parts in every) for key in product(CUE_AXES, CAUSES)}
 
 
 def _mean(values: Iterable[float]) -> float:

@@ -64,7 +64,7 @@ def subsystem(actuator: int) -> int:
 def lag(
     m: Machine, actuator: int, y: real, y_rate: real, u: real, u_rate: real, u_next: real, dt: real
 ) -> vec2:
-    """Position and rate of a lagging actuator after a step in which its set-point's rate goes to ``u_next``."""
+    """Position and rate of a lagging actuator after a step; its set-point's rate goes to ``u_next``."""
     row = 2 * subsystem(actuator)
     u_acceleration = (u_next - u_rate) / dt
     position = (

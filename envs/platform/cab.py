@@ -1,4 +1,4 @@
-"""Motion of points fixed to the cab, which the turntable turns on the hexapod: Eqs. (14), (15), (30) to (40)."""
+"""Points fixed to the cab, which the turntable turns on the hexapod: Eqs. (14), (15), (30) to (40)."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3,
 def adjoint_forward_kinematics(
     g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3, adjoint: vec6
 ):
-    """Implicit function theorem: d pose / d extensions = J^-1 at the solution; the first guess has no part."""
+    """Implicit function theorem: d pose / d extensions = J^-1; the first guess has no part."""
     pose = forward_kinematics(g, extensions, displacement, beta)
     s = vec3(pose[0], pose[1], pose[2])
     b = vec3(pose[3], pose[4], pose[5])

@@ -53,7 +53,7 @@ def _launch(kernel: Any, hexapod: Hexapod, *inputs: NDArray[np.float64]) -> NDAr
 
 
 def legs_of_pose(hexapod: Hexapod, pose: ArrayLike) -> NDArray[np.float64]:
-    """Eqs. (12), (13): extensions (..., 6), m, of poses [x, y, z, roll, pitch, yaw] from neutral, m and rad."""
+    """Eqs. (12), (13): extensions (..., 6), m, of poses [x, y, z, roll, pitch, yaw], m and rad."""
     return _launch(_inverse, hexapod, _sixes("pose", pose))
 
 

@@ -20,7 +20,7 @@ from ..precision import real, vec2
 
 @wp.func
 def braking_speed(distance: real, speed: real, acceleration: real, dt: real) -> real:
-    """Greatest speed towards an end of travel, ``distance`` away, after a step begun at ``speed`` towards it."""
+    """Greatest speed towards an end of travel ``distance`` away, after a step begun at ``speed``."""
     half_step = real(0.5) * acceleration * dt
     room = distance - real(0.5) * speed * dt
     # The threshold is where the root equals the half step; below it only standing still is safe.

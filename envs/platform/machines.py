@@ -1,4 +1,4 @@
-"""Machines as configurations: carriage, hexapod, turntable and cab, in SI units. See presets.py for real ones."""
+"""Machines as configurations: carriage, hexapod, turntable and cab, in SI units."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Hexapod:
         shortest = float(np.min(self.neutral_lengths)) + self.extension[0]
         if shortest <= 0.0:
             raise ConfigurationError(
-                f"extension[0] = {self.extension[0]} leaves a leg of {shortest:.3f} m; a leg must keep a length"
+                f"extension[0] = {self.extension[0]} leaves a leg of {shortest:.3f} m; a leg needs a length"
             )
 
     @property

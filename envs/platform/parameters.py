@@ -19,7 +19,7 @@ UNLIMITED: Final = 1e9
 """Travel of an unlimited turntable in the kernels, rad: finite, so that no infinity meets a zero."""
 
 _LEAST_CONDITION: Final = 1e-3
-"""Least ratio of smallest to largest singular value of the neutral Jacobian (lengths over the joint radius)."""
+"""Least ratio of the neutral Jacobian's singular values (lengths over the joint radius)."""
 
 LOCKED: Final = 1.0
 """Velocity and acceleration limit of a missing subsystem, whose travel is zero."""

@@ -62,7 +62,7 @@ def neutral_height(upper: Joints, lower: Joints, length: float) -> Vector3:
     span = math.sqrt(float(np.mean(np.sum(flat**2, axis=1))))
     if length <= span:
         raise GeometryError(
-            f"the hexapod cannot close: legs of {length:.3f} m do not reach from the lower to the upper joints, "
+            f"the hexapod cannot close: legs of {length:.3f} m do not reach between the joints, "
             f"which lie {span:.3f} m apart in plan; lengthen the legs or move the joints"
         )
     return (0.0, 0.0, -math.sqrt(length**2 - span**2))

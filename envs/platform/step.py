@@ -32,7 +32,7 @@ FAR_FROM_SINGULAR = wp.constant(real(0.75))
 """Clearance from which braking is taken not to lead to a singular pose."""
 
 NEIGHBOURHOOD = wp.constant(real(0.35))
-"""Largest change of an Euler angle while the legs brake, rad; more means that a singular pose lies between."""
+"""Largest change of an Euler angle while the legs brake, rad; more means a singular pose between."""
 
 
 @wp.func
@@ -136,16 +136,23 @@ def keeps_clear(
 
 
 @wp.func
+def joined(carriage_x: real, carriage_y: real, legs: vec6, turntable: real) -> vec9:
+    """The nine actuators of their parts."""
+    return vec9(carriage_x, carriage_y, legs[0], legs[1], legs[2], legs[3], legs[4], legs[5], turntable)
+
+
+@wp.func
+def legs_of(actuators: vec9) -> vec6:
+    """The six legs among the nine actuators."""
+    return vec6(actuators[2], actuators[3], actuators[4], actuators[5], actuators[6], actuators[7])
+
+
+@wp.func
 def with_legs(motion: Motion, extensions: vec6, rates: vec6) -> Motion:
     """A motion with its legs replaced."""
     after = motion
-    position = motion.position
-    rate = motion.rate
-    for i in range(6):
-        position[i + 2] = extensions[i]
-        rate[i + 2] = rates[i]
-    after.position = position
-    after.rate = rate
+    after.position = joined(motion.position[0], motion.position[1], extensions, motion.position[8])
+    after.rate = joined(motion.rate[0], motion.rate[1], rates, motion.rate[8])
     return after
 
 
@@ -163,15 +170,10 @@ def with_pose(motion: Motion, pose: vec6, pose_rate: vec6) -> Motion:
 @wp.func
 def pose_from_legs(m: Machine, motion: Motion, guess: Motion) -> Motion:
     """The motion whose pose and rates follow from its legs, by forward kinematics from a neighbouring one."""
-    extensions = vec6()
-    rates = vec6()
-    for i in range(6):
-        extensions[i] = motion.position[i + 2]
-        rates[i] = motion.rate[i + 2]
-    pose = forward_kinematics(m.geometry, extensions, guess.displacement, guess.beta)
+    pose = forward_kinematics(m.geometry, legs_of(motion.position), guess.displacement, guess.beta)
     beta = vec3(pose[3], pose[4], pose[5])
     jacobian = leg_jacobian(m.geometry, vec3(pose[0], pose[1], pose[2]), beta)
-    return with_pose(motion, pose, platform_rates(jacobian, beta, rates))
+    return with_pose(motion, pose, platform_rates(jacobian, beta, legs_of(motion.rate)))
 
 
 @wp.func
@@ -189,12 +191,8 @@ def legs_towards(m: Machine, start: Motion, target: Motion, rates: vec6, dt: rea
 def limited_legs(m: Machine, start: Motion, target: Motion, rates: vec6, dt: real) -> Motion:
     """Legs towards their asked rates, or braking to rest where that would lead into a singular pose."""
     moved = legs_towards(m, start, target, rates, dt)
-    reached = vec6()
-    extensions = vec6()
-    for i in range(6):
-        reached[i] = moved.rate[i + 2]
-        extensions[i] = moved.position[i + 2]
-    if keeps_clear(m, start, moved.displacement, moved.beta, extensions, reached):
+    extensions = legs_of(moved.position)
+    if keeps_clear(m, start, moved.displacement, moved.beta, extensions, legs_of(moved.rate)):
         return moved
     return legs_towards(m, start, target, vec6(), dt)
 
@@ -202,15 +200,18 @@ def limited_legs(m: Machine, start: Motion, target: Motion, rates: vec6, dt: rea
 @wp.func
 def limit_axes(m: Machine, start: Motion, action: vec9, dt: real) -> Motion:
     """Carriage and turntable after the step, each within its own limits; the hexapod as it was."""
+    half = real(0.5) * dt
+    x = limited_rate(m, start, 0, start.rate[0] + action[0] * dt, dt)
+    y = limited_rate(m, start, 1, start.rate[1] + action[1] * dt, dt)
+    t = limited_rate(m, start, 8, start.rate[8] + action[8] * dt, dt)
     after = start
-    position = start.position
-    rate = start.rate
-    for i in range(9):
-        if i < 2 or i == 8:
-            rate[i] = limited_rate(m, start, i, start.rate[i] + action[i] * dt, dt)
-            position[i] = start.position[i] + real(0.5) * dt * (start.rate[i] + rate[i])
-    after.position = position
-    after.rate = rate
+    after.rate = joined(x, y, legs_of(start.rate), t)
+    after.position = joined(
+        start.position[0] + half * (start.rate[0] + x),
+        start.position[1] + half * (start.rate[1] + y),
+        legs_of(start.position),
+        start.position[8] + half * (start.rate[8] + t),
+    )
     return after
 
 
@@ -295,8 +296,9 @@ def actuate(
     if m.has_lag == 0 and m.has_dead_time == 0:
         return setpoint
     after = motion
-    position = motion.position
-    rate = motion.rate
+    # New vectors: changing entries of a copied one loses gradients in Warp.
+    position = vec9()
+    rate = vec9()
     for i in range(9):
         steps = m.dead_steps[subsystem(i)]
         begin = delay[environment, steps]
