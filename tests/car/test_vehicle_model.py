@@ -194,14 +194,14 @@ def rigid(car: Car) -> Car:
 
 
 def test_bmw_agrees_with_commonroad_single_track_in_the_linear_range():
-    """Same steering angle into both models: yaw rate within 1.5 % and side slip within 2.5 % of its peak."""
+    """Same steering angle into both models: yaw rate and side slip within 1 % of their peaks."""
     from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
     from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st
 
     car, speed = rigid(get_car("bmw-320i")), 30.0
     time = DT * np.arange(801)
     wave = np.where(time > 1.0, np.sin(2.0 * np.pi * 0.5 * (time - 1.0)), 0.0)
-    trace = open_loop(car, speed, 8.0 * DEG * wave)
+    trace = open_loop(car, speed, 1.0 * DEG * wave)
     delta = trace.channels["steering_wheel_rad"] / car.steering.ratio
     parameters, substeps = parameters_vehicle2(), 10
     state = np.array([0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0])
@@ -212,12 +212,12 @@ def test_bmw_agrees_with_commonroad_single_track_in_the_linear_range():
         for k in range(substeps):
             state[2] = here + (there - here) * (k + 0.5) / substeps
             state = state + DT / substeps * np.array(vehicle_dynamics_st(state, [0.0, 0.0], parameters))
-    for ours, theirs, share in (
-        (trace.angular_velocity[:, 2], np.array(yaw_rate), 0.015),
-        (trace.channels["lateral_speed_m_s"] / trace.channels["speed_m_s"], np.array(slip), 0.025),
+    for ours, theirs in (
+        (trace.angular_velocity[:, 2], np.array(yaw_rate)),
+        (trace.channels["lateral_speed_m_s"] / trace.channels["speed_m_s"], np.array(slip)),
     ):
-        assert np.abs(theirs).max() > 1e-3
-        np.testing.assert_allclose(ours, theirs, atol=share * np.abs(theirs).max())
+        assert np.abs(theirs).max() > 5e-4
+        np.testing.assert_allclose(ours, theirs, atol=0.01 * np.abs(theirs).max())
 
 
 def test_driver_follows_a_circle_without_steady_error():
