@@ -5,18 +5,16 @@ The adjoint is compiled as a module of its own, when it is first asked for (abou
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
-from pydantic.dataclasses import dataclass
 
+from .cue_cost import CueCost, Zone, cue_error, zone
 from .errors import ActionError
 from .platform.state import SetPoint
 from .precision import FLOAT, real, vec9
-from .settings import STRICT, Positive
 from .simulator import N_AXES, Simulator
 from .state import State
 from .step import step_kernel
@@ -25,28 +23,11 @@ step_with_adjoint = wp.kernel(step_kernel, enable_backward=True, module="unique"
 """The step of :mod:`.step` with its adjoint."""
 
 
-@dataclass(frozen=True, config=STRICT)
-class CueCost:
-    """|df|^2 / force^2 + |dw|^2 / rate^2, the headline J: by default over the published indifference zone.
-
-    Args:
-        force: m/s^2.
-        rate: rad/s.
-    """
-
-    force: Positive = 0.6
-    rate: Positive = math.radians(3.0)
-
-
 @wp.kernel(enable_backward=True, module="unique")
-def _add_cue_cost(
-    state: wp.array(dtype=State), force: real, rate: real, share: real, cost: wp.array(dtype=real)
-) -> None:
+def add_cue_error(z: Zone, state: wp.array(dtype=State), share: real, cost: wp.array(dtype=real)) -> None:
+    """Add a share of the cost of this moment, for every environment."""
     i = wp.tid()
-    s = state[i]
-    df = (s.felt.force - s.wanted.force) / force
-    dw = (s.felt.rate - s.wanted.rate) / rate
-    wp.atomic_add(cost, i, share * (wp.dot(df, df) + wp.dot(dw, dw)))
+    wp.atomic_add(cost, i, share * cue_error(z, state[i]))
 
 
 class Unroll:
@@ -61,7 +42,7 @@ class Unroll:
     """
 
     def __init__(self, simulator: Simulator, steps: int, cost: CueCost | None = None) -> None:
-        self.simulator, self.steps, self.cost = simulator, steps, cost or CueCost()
+        self.simulator, self.steps, self._zone = simulator, steps, zone(cost or CueCost())
         n, device = simulator.n, simulator.device
         keep: dict[str, Any] = {"device": device, "requires_grad": True}
         self.states = [wp.zeros(n, dtype=State, **keep) for _ in range(steps + 1)]
@@ -110,14 +91,9 @@ class Unroll:
                 device=simulator.device,
             )
             wp.launch(
-                _add_cue_cost,
+                add_cue_error,
                 simulator.n,
-                inputs=[
-                    self.states[k + 1],
-                    real(self.cost.force),
-                    real(self.cost.rate),
-                    real(1.0 / self.steps),
-                ],
+                inputs=[self._zone, self.states[k + 1], real(1.0 / self.steps)],
                 outputs=[self.costs],
                 device=simulator.device,
             )

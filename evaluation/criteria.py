@@ -6,7 +6,10 @@ from math import radians
 
 from pydantic.dataclasses import dataclass
 
+from ..envs.cue_cost import CueCost
 from ..envs.settings import STRICT, Positive, Vector3
+
+_ZONE = CueCost()
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -25,8 +28,8 @@ class Criteria:
         action_tolerance: An applied acceleration this near the asked one is not clipped, m/s^2 and rad/s^2.
     """
 
-    indifference_force: Positive = 0.6
-    indifference_rate: Positive = radians(3.0)
+    indifference_force: Positive = _ZONE.force
+    indifference_rate: Positive = _ZONE.rate
     force_threshold: Vector3 = (0.17, 0.17, 0.28)
     rate_threshold: Vector3 = (radians(3.0), radians(3.6), radians(2.6))
     tilt_rate: Positive = radians(3.0)

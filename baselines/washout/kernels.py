@@ -1,9 +1,10 @@
-"""The washout as kernels: from observations, for the policy; and fused with the machine, for tuning."""
+"""The washout as kernels: from observations, fused with the machine, and with its adjoint."""
 
 from __future__ import annotations
 
 import warp as wp
 
+from ...envs.cue_cost import Zone, cue_error, perceived_error
 from ...envs.cues import GRAVITY
 from ...envs.observation import SCALES, SLICES
 from ...envs.perception.filters import Vestibular
@@ -90,6 +91,15 @@ def predict(
     action[i] = out.action
 
 
+@wp.struct
+class Score:
+    """Means over a drive."""
+
+    cue_error: real  # J
+    perceived_error: real
+    at_limit: real  # share of the steps in which a limit is met
+
+
 @wp.kernel(enable_backward=False, module="unique")
 def drive_through(
     machines: wp.array(dtype=Machine),
@@ -101,18 +111,54 @@ def drive_through(
     delay: wp.array2d(dtype=SetPoint),
     parameters: wp.array(dtype=Parameters),
     parameters_of: wp.array(dtype=int),
+    z: Zone,
     initial: wp.array(dtype=State),
-    steps: int,
-    history: wp.array2d(dtype=State),
+    first: int,
+    score: wp.array(dtype=Score),
 ) -> None:
-    """Washout and machine through many steps in one launch; ``history[k, i]`` is environment i after step k."""
-    i = wp.tid()
+    """Washout and machine through whole drives in one launch, environment ``first`` and on."""
+    i = first + wp.tid()
     p = parameters[parameters_of[i]]
-    machine = machines[machine_of[i]]
+    m = machines[machine_of[i]]
     state = initial[i]
     memory = initial_memory(p, read_state(state))
-    for k in range(steps):
+    count = drives.length[drive_of[i]]
+    cue = cue_error(z, state)
+    perceived = perceived_error(z, state)
+    limited = real(0.0)
+    for _ in range(1, count):
         out = washout(p, memory, read_state(state), dt)
         memory = out.memory
-        state = next_state(machine, vestibular[0], drives, drive_of[i], delay, i, state, out.action, dt)
-        history[k, i] = state
+        state = next_state(m, vestibular[0], drives, drive_of[i], delay, i, state, out.action, dt)
+        cue = cue + cue_error(z, state)
+        perceived = perceived + perceived_error(z, state)
+        if state.limits != wp.uint64(0):
+            limited = limited + real(1.0)
+    result = Score()
+    result.cue_error = cue / real(count)
+    result.perceived_error = perceived / real(count)
+    result.at_limit = limited / real(count)
+    score[i] = result
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def act(
+    parameters: wp.array(dtype=Parameters),
+    parameters_of: wp.array(dtype=int),
+    state: wp.array(dtype=State),
+    memory: wp.array(dtype=Memory),
+    begins: int,
+    dt: real,
+    memory_out: wp.array(dtype=Memory),
+    action: wp.array(dtype=vec9),
+) -> None:
+    """The washout on the simulator's own state, with its adjoint; memories begin anew where ``begins``."""
+    i = wp.tid()
+    p = parameters[parameters_of[i]]
+    seen = read_state(state[i])
+    m = memory[i]
+    if begins != 0:
+        m = initial_memory(p, seen)
+    out = washout(p, m, seen, dt)
+    memory_out[i] = out.memory
+    action[i] = out.action

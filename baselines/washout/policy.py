@@ -49,6 +49,13 @@ def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
     return k
 
 
+def start_pose(p: WashoutParameters) -> Array:
+    """(9,) pose to begin a drive at: C'(0) and S'(0)."""
+    pose = np.zeros(N_AXES)
+    pose[:2], pose[2:5] = p.start_carriage, p.start_hexapod
+    return pose
+
+
 class _Buffers:
     """Arrays of one batch size and the launch recorded on them."""
 
@@ -98,10 +105,8 @@ class ClassicalWashout:
 
     @property
     def start(self) -> Array:
-        """(9,) pose to begin a drive at: C'(0) and S'(0)."""
-        pose = np.zeros(N_AXES)
-        pose[:2], pose[2:5] = self.parameters.start_carriage, self.parameters.start_hexapod
-        return pose
+        """(9,) pose to begin a drive at."""
+        return start_pose(self.parameters)
 
     def predict(
         self,

@@ -10,7 +10,7 @@ import pytest
 from motion_cueing.envs.platform import ACTUATORS
 from motion_cueing.envs.settings import from_dict, to_dict
 from motion_cueing.evaluation.criteria import Criteria
-from motion_cueing.evaluation.metrics import AXES, Metrics, measure
+from motion_cueing.evaluation.metrics import CUE_AXES, Metrics, measure
 
 from .synthetic import GRAVITY, drive, trajectory
 
@@ -143,7 +143,7 @@ def test_metrics_round_trip_through_strict_json():
     metrics = measure(drive(gain=0.0))
     text = json.dumps(to_dict(metrics), allow_nan=False)
     assert from_dict(Metrics, json.loads(text)) == metrics
-    assert list(json.loads(text)["axes"]) == list(AXES)
+    assert list(json.loads(text)["axes"]) == list(CUE_AXES)
 
 
 def test_criteria_change_the_cue_error():

@@ -10,7 +10,7 @@ import struct
 import pytest
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.evaluation.figures import maneuver_figure
-from motion_cueing.evaluation.metrics import AXES, measure
+from motion_cueing.evaluation.metrics import CUE_AXES, measure
 from motion_cueing.evaluation.provenance import plain, provenance
 from motion_cueing.evaluation.report import render
 from motion_cueing.evaluation.results import SCHEMA, Failure, Results
@@ -52,7 +52,7 @@ def test_json_is_strict_and_documented(results, tmp_path):
         "criteria",
     ]
     assert values["maneuvers"]["weave"]["no-motion"]["axes"]["f_y"]["correlation"] is None
-    assert list(values["maneuvers"]["weave"]["washout"]["axes"]) == list(AXES)
+    assert list(values["maneuvers"]["weave"]["washout"]["axes"]) == list(CUE_AXES)
     assert values["provenance"]["command"] == "motion-cueing evaluate --policy 'a b'"
     assert values["provenance"]["configuration"]["policies"]["washout"]["parameters"] == {"gain": 1}
     assert {"python", "numpy", "motion-cueing-gym"} <= set(values["provenance"]["versions"])

@@ -1,0 +1,142 @@
+"""Many washouts through many drives at once, and the gradient of J in their parameters: what tuning needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from ...envs.cue_cost import CueCost, zone
+from ...envs.cues import CueTrace
+from ...envs.errors import ConfigurationError
+from ...envs.gradient import add_cue_error, step_with_adjoint
+from ...envs.platform import Platform
+from ...envs.platform.state import SetPoint
+from ...envs.precision import real, vec9
+from ...envs.simulator import Simulator
+from ...envs.state import State
+from .kernels import Score, act, drive_through
+from .parameters import WashoutParameters
+from .policy import kernel_parameters, start_pose
+from .step import Memory, Parameters
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Means over drives, each (sets, drives).
+
+    Args:
+        cue_error: J.
+        perceived_error: Its perceived twin.
+        at_limit: Share of the steps in which a limit is met.
+    """
+
+    cue_error: Floats
+    perceived_error: Floats
+    at_limit: Floats
+
+
+class WashoutBatch:
+    """Every parameter set on every drive: one environment for each pair.
+
+    Args:
+        sets: Parameter sets.
+        drives: Cue traces of the same time step.
+        platform: The machine, without lag or dead time.
+
+    Raises:
+        ConfigurationError: the machine has a lag or a dead time, which one fused launch does not simulate.
+    """
+
+    def __init__(
+        self, sets: Sequence[WashoutParameters], drives: Sequence[CueTrace], platform: Platform
+    ) -> None:
+        self.shape = len(sets), len(drives)
+        drive_of = np.tile(np.arange(len(drives)), len(sets))
+        self.simulator = Simulator(platform, drives, drive_of=drive_of, dt=drives[0].dt)
+        machine = self.simulator.machines.numpy()[0]
+        if machine["has_lag"] or machine["has_dead_time"]:
+            raise ConfigurationError(
+                "actuator dynamics must be unity in a washout batch; use rollout instead"
+            )
+        values = [kernel_parameters(p, platform.cab) for p in sets]
+        self.parameters = wp.array(values, dtype=Parameters, requires_grad=True)
+        self.parameters_of = wp.array(np.repeat(np.arange(len(sets)), len(drives)), dtype=int)
+        self.simulator.reset(np.repeat([start_pose(p) for p in sets], len(drives), axis=0))
+
+    def scores(self, cost: CueCost | None = None, threads: int = 1) -> Scores:
+        """Drive them all to their ends.
+
+        Args:
+            cost: What J measures.
+            threads: Launches side by side; a launch on the CPU uses one core and lets others run.
+        """
+        simulator, n = self.simulator, self.simulator.n
+        score = wp.zeros(n, dtype=Score)
+        bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)
+
+        def launch(part: int) -> None:
+            first, last = int(bounds[part]), int(bounds[part + 1])
+            inputs = [*simulator.constants, simulator.delay_array, self.parameters, self.parameters_of]
+            inputs += [zone(cost or CueCost()), simulator.state_array, first]
+            wp.launch(drive_through, last - first, inputs=inputs, outputs=[score], device="cpu")
+
+        drive_through.module.load(simulator.device)
+        with ThreadPoolExecutor(len(bounds) - 1) as pool:
+            list(pool.map(launch, range(len(bounds) - 1)))
+        values = score.numpy()
+        return Scores(
+            **{name: values[name].reshape(self.shape).astype(np.float64) for name in values.dtype.names}
+        )
+
+    def gradient(self, steps: int, cost: CueCost | None = None) -> tuple[Floats, NDArray[Any]]:
+        """Mean J of each set over the first steps of all drives, and its gradient in every parameter.
+
+        Returns:
+            (sets,) costs and (sets,) structured gradients with the fields of the kernel's ``Parameters``.
+        """
+        n, keep = self.simulator.n, {"requires_grad": True}
+        states = [wp.zeros(n, dtype=State, **keep) for _ in range(steps + 1)]
+        memories = [wp.zeros(n, dtype=Memory, **keep) for _ in range(steps + 1)]
+        actions = [wp.zeros(n, dtype=vec9, **keep) for _ in range(steps)]
+        costs = wp.zeros(n, dtype=real, **keep)
+        wp.copy(states[0], self.simulator.state_array)
+        with wp.Tape() as tape:
+            self._unroll(states, memories, actions, costs, zone(cost or CueCost()))
+        tape.backward(grads={costs: wp.full(n, 1.0 / self.shape[1], dtype=real)})
+        gradient = self.parameters.grad.numpy().copy()
+        tape.zero()
+        return costs.numpy().reshape(self.shape).mean(axis=1), gradient
+
+    def _unroll(self, states: list[Any], memories: list[Any], actions: list[Any], costs: Any, z: Any) -> None:
+        simulator = self.simulator
+        delay = wp.zeros((simulator.n, 1), dtype=SetPoint)
+        for k in range(len(actions)):
+            wp.launch(
+                act,
+                simulator.n,
+                inputs=[
+                    self.parameters,
+                    self.parameters_of,
+                    states[k],
+                    memories[k],
+                    int(k == 0),
+                    simulator.dt,
+                ],
+                outputs=[memories[k + 1], actions[k]],
+            )
+            wp.launch(
+                step_with_adjoint,
+                simulator.n,
+                inputs=[*simulator.constants, states[k], delay, actions[k]],
+                outputs=[states[k + 1], delay],
+            )
+            share = real(1.0 / len(actions))
+            wp.launch(add_cue_error, simulator.n, inputs=[z, states[k + 1], share], outputs=[costs])
