@@ -233,7 +233,7 @@ def _checked(trace: str, label: str, values: ArrayLike, shape: tuple[int | None,
     ):
         wanted = "(" + ", ".join("n" if w is None else str(w) for w in shape) + ")"
         raise DataError(f"{trace}: {label} has shape {array.shape}, expected {wanted}")
-    bad = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=tuple(range(1, array.ndim))))
     if len(bad):
         raise DataError(f"{trace}: {label} is not finite at sample {bad[0]} ({len(bad)} samples in all)")
     array.setflags(write=False)

@@ -171,7 +171,7 @@ def _cut(log: RawLog, options: ImportOptions) -> RawLog:
     signals = {name: values[keep] for name, values in log.signals.items()}
     if "course" in signals:
         signals["course"] = _unwrapped(signals["course"])
-    return RawLog(log.time[keep], signals)
+    return RawLog(log.time[keep], signals, log.rows[keep])
 
 
 def _unwrapped(course: Floats) -> Floats:

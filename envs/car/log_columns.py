@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cues import Floats, read_table
 from ..errors import ConfigurationError, DataError, suggest
@@ -42,10 +43,12 @@ class RawLog:
     Attributes:
         time: (n,) s, starting at 0; may be broken in every way a log can be.
         signals: Each (n,), SI units, device axes; NaN where a cell was empty.
+        rows: (n,) number of each data row in the file, from 1, for messages.
     """
 
     time: Floats
     signals: Mapping[str, Floats]
+    rows: NDArray[np.intp]
 
 
 def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -98,7 +101,8 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
         raise DataError(f"{path}: column {columns['time']} holds no time stamp")
     # Subtracting before scaling keeps the digits of stamps counted from 1970.
     time = (stamps - stamps[np.isfinite(stamps)][0]) * factors["time"]
-    return RawLog(time, {name: signal(name) for name in columns if name != "time"})
+    signals = {name: signal(name) for name in columns if name != "time"}
+    return RawLog(time, signals, np.arange(1, n + 1))
 
 
 def _factors(columns: Mapping[str, str], units: Mapping[str, str]) -> dict[str, float]:

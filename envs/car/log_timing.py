@@ -67,9 +67,11 @@ def close_gaps(log: RawLog, policy: GapPolicy) -> tuple[dict[str, Series], Timin
     Raises:
         DataError: time runs backwards, or there is a gap that the policy refuses.
     """
-    keep = _kept_rows(log.time, policy)
-    time = log.time[keep]
-    series = {name: _without_holes(name, time, values[keep], policy) for name, values in log.signals.items()}
+    keep = _kept_rows(log, policy)
+    rows, time = log.rows[keep], log.time[keep]
+    series = {
+        name: _without_holes(name, (time, values[keep]), rows, policy) for name, values in log.signals.items()
+    }
     bridged = sum(_bridge(name, stamps, policy) for name, (stamps, _) in series.items())
     steps = np.diff(time)
     cells = sum(int(np.isnan(values[keep]).sum()) for values in log.signals.values())
@@ -83,26 +85,28 @@ def close_gaps(log: RawLog, policy: GapPolicy) -> tuple[dict[str, Series], Timin
     )
 
 
-def _kept_rows(time: Floats, policy: GapPolicy) -> NDArray[np.intp]:
+def _kept_rows(log: RawLog, policy: GapPolicy) -> NDArray[np.intp]:
+    """Indices of the rows with a time stamp of their own."""
+    time = log.time
     known = np.flatnonzero(np.isfinite(time))
-    _refuse(policy, np.flatnonzero(~np.isfinite(time)), "time is empty")
+    _refuse(policy, log.rows[~np.isfinite(time)], "time is empty")
     steps = np.diff(time[known])
     if np.any(steps < 0.0):
-        row = known[int(np.argmax(steps < 0.0)) + 1] + 1
+        row = log.rows[known[int(np.argmax(steps < 0.0)) + 1]]
         raise DataError(f"time runs backwards at data row {row}; sort or split the log")
-    _refuse(policy, known[1:][steps == 0.0], "time stamp repeats")
+    _refuse(policy, log.rows[known[1:][steps == 0.0]], "time stamp repeats")
     kept = np.concatenate([known[:1], known[1:][steps > 0.0]])
     if len(kept) < 2 or time[kept[-1]] - time[kept[0]] < _SHORTEST_S:
         raise DataError(f"the log is shorter than {_SHORTEST_S:g} s; check the unit of time")
     return kept
 
 
-def _without_holes(name: str, time: Floats, values: Floats, policy: GapPolicy) -> Series:
+def _without_holes(name: str, series: Series, rows: NDArray[np.intp], policy: GapPolicy) -> Series:
+    time, values = series
     if np.any(np.isinf(values)):
-        row = int(np.argmax(np.isinf(values))) + 1
-        raise DataError(f"{name} is infinite at data row {row}; mend the log")
+        raise DataError(f"{name} is infinite at data row {rows[np.isinf(values)][0]}; mend the log")
     known = np.isfinite(values)
-    _refuse(policy, np.flatnonzero(~known), f"{name} has an empty or NaN cell")
+    _refuse(policy, rows[~known], f"{name} has an empty or NaN cell")
     if known.sum() < 2:
         raise DataError(f"{name} has fewer than 2 values; name another column")
     return time[known], values[known]
@@ -129,7 +133,7 @@ def _bridge(name: str, time: Floats, policy: GapPolicy) -> int:
 def _refuse(policy: GapPolicy, rows: NDArray[np.intp], what: str) -> None:
     if policy.gaps == "refuse" and len(rows):
         raise DataError(
-            f"{what} at data row {int(rows[0]) + 1} ({len(rows)} in all); set gaps to bridge, or mend the log"
+            f"{what} at data row {rows[0]} ({len(rows)} in all); set gaps to bridge, or mend the log"
         )
 
 

@@ -1,0 +1,97 @@
+"""The command ``motion-cueing import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tyro
+from motion_cueing.envs import CueTrace
+from motion_cueing.envs.car.log_columns import parse_columns
+from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.import_command import ImportCommand, run
+
+from ..car.synthetic_log import COLUMNS, Device, drive, write
+
+TEXTS = [f"{signal}={column}" for signal, column in COLUMNS.items()]
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return write(tmp_path / "log.csv", Device(yaw=0.5).records(drive()))
+
+
+def parsed(*arguments: str) -> ImportCommand:
+    return tyro.cli(ImportCommand, args=list(arguments))
+
+
+def test_columns_once_or_repeated() -> None:
+    once = parsed("log.csv", "--column", "time=t:ms", "speed=v", "--out", "cues.csv")
+    repeated = parsed("log.csv", "--column", "time=t:ms", "--column", "speed=v", "--out", "cues.csv")
+    assert [text for group in once.column for text in group] == ["time=t:ms", "speed=v"]
+    assert [text for group in repeated.column for text in group] == ["time=t:ms", "speed=v"]
+    options = parsed(
+        "log.csv", "--column", "a=b", "--out", "x", "--gaps", "bridge", "--yaw-deg", "-90"
+    ).conversion
+    assert (options.gaps, options.yaw_deg) == ("bridge", -90.0)
+
+
+def test_column_texts() -> None:
+    columns, units = parse_columns(["time=t:ms", "force_x=-a:x:g", "speed=v"])
+    assert columns == {"time": "t", "force_x": "-a:x", "speed": "v"}
+    assert units == {"time": "ms", "force_x": "g"}
+    for text in ("time", "time=", "tme=t"):
+        with pytest.raises(MotionCueingError):
+            parse_columns([text])
+    with pytest.raises(ConfigurationError, match="'time' is given twice"):
+        parse_columns(["time=t", "time=u"])
+
+
+def test_files_and_findings(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, plot = tmp_path / "cues.csv.gz", tmp_path / "plot.png"
+    arguments = [str(log), "--column", *TEXTS, "--out", str(out), "--plot", str(plot), "--decimals", "4"]
+    assert main(["import", *arguments]) == 0
+    said = capsys.readouterr().out
+    assert "yaw 28.6 deg" in said
+    assert "no course" in said
+    trace = CueTrace.from_csv(out)
+    assert trace.name == "cues"
+    assert trace.specific_force[:, 2].mean() == pytest.approx(-9.81, abs=1e-2)
+    assert np.array_equal(np.round(trace.specific_force, 4), trace.specific_force)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_log_without_speed_still_has_a_picture(log: Path, tmp_path: Path) -> None:
+    plot = tmp_path / "plot.png"
+    texts = [text for text in TEXTS if not text.startswith("speed")]
+    arguments = [str(log), "--column", *texts, "--out", str(tmp_path / "c.csv"), "--plot", str(plot)]
+    assert run(parsed(*arguments, "--yaw-deg", "28.6")) == 0
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_bad_input_writes_nothing(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "cues.csv"
+    cases = {
+        "--decimals": (["--column", *TEXTS, "--decimals", "-1"], "decimals is -1; use 0 to 15"),
+        "column": (["--column", "time=t"], "no column for force_x"),
+        "name": (["--column", "tim=t"], "Did you mean time"),
+        "missing": (["--column", *TEXTS[1:], "time=stamp"], "missing column stamp"),
+        "cutoff": (["--column", *TEXTS, "--cutoff-hz", "-1"], "cutoff_hz"),
+    }
+    for arguments, message in cases.values():
+        assert main(["import", str(log), "--out", str(out), *arguments]) == 2
+        captured = capsys.readouterr()
+        assert message in captured.err
+        assert "Traceback" not in captured.err
+    assert not out.exists()
+
+
+def test_the_log_is_never_overwritten(log: Path) -> None:
+    before = log.read_bytes()
+    with pytest.raises(ConfigurationError, match="is the log itself"):
+        run(parsed(str(log), "--column", *TEXTS, "--out", str(log)))
+    assert log.read_bytes() == before
+    with pytest.raises(DataError, match="cannot be read"):
+        run(parsed("missing.csv", "--column", *TEXTS, "--out", "cues.csv"))
