@@ -138,7 +138,7 @@ class Simulator:
         On the CPU it is a view that the step after next overwrites.
         """
         if self._views is not None:
-            return self._views[self._now]
+            return np.asarray(self._views[self._now])
         return np.asarray(self.state_array.numpy())
 
     @property
@@ -193,10 +193,8 @@ class Simulator:
             legs = legs_of_pose(self.platforms[self.platform_of[i]].hexapod, poses[i, 2:8])
             position = np.concatenate([poses[i, :2], legs, poses[i, 8:]])
             if np.any(position < machine["position_min"]) or np.any(position > machine["position_max"]):
-                raise DataError(f"start pose {i} lies outside the travel of {self._name(i)}: {poses[i]}")
-
-    def _name(self, i: int) -> str:
-        return self.platforms[self.platform_of[i]].name
+                name = self.platforms[self.platform_of[i]].name
+                raise DataError(f"start pose {i} lies outside the travel of {name}: {poses[i]}")
 
     def step(self, action: ArrayLike) -> NDArray[Any]:
         """Advance every environment by one time step.

@@ -142,7 +142,7 @@ def step_kernel(
     i = wp.tid()
     m = machines[machine_of[i]]
     after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, state[i], action[i], dt)
-    if m.has_lag != 0 or m.has_dead_time != 0:
+    if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
 

@@ -45,7 +45,7 @@ def drive_cases() -> dict[str, Trajectory]:
     platform, car = get_platform("paper"), get_car("sedan")
     cues = {name: get_maneuver(name).drive(car) for name in {maneuver for maneuver, _ in CASES.values()}}
     return {
-        case: rollout(make_policy(preset, platform), cues[maneuver], platform, car.name)
+        case: rollout(make_policy(preset, platform), cues[maneuver], platform, car)
         for case, (maneuver, preset) in CASES.items()
     }
 

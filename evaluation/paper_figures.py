@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -38,7 +40,13 @@ def _curves(axes: Axes, time: Floats, car: Floats, simulators: dict[str, Floats]
 
 
 def _in_g(axes: Axes) -> None:
-    axes.secondary_yaxis("right", functions=(lambda f: f / GRAVITY, lambda f: f * GRAVITY)).set_ylabel("g")
+    def to_g(force: Any) -> Any:
+        return force / GRAVITY
+
+    def from_g(force: Any) -> Any:
+        return force * GRAVITY
+
+    axes.secondary_yaxis("right", functions=(to_g, from_g)).set_ylabel("g")
 
 
 def _lateral_force(drives: Drives) -> Figure:

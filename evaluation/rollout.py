@@ -12,6 +12,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from ..baselines.policy import Policy, start_of
+from ..envs.car import Car
 from ..envs.cues import CueTrace
 from ..envs.errors import ActionError
 from ..envs.observation import OBSERVATION_SIZE, observe_forward
@@ -47,7 +48,7 @@ def rollout(
     policy: Policy,
     cues: CueTrace,
     platform: Platform | None = None,
-    car: str = "",
+    car: Car | None = None,
     *,
     start: ArrayLike | None = None,
     vestibular: VestibularModel | None = None,
@@ -60,7 +61,7 @@ def rollout(
         policy: Anything with ``predict``.
         cues: The drive; another time step is resampled.
         platform: The machine; default: the paper's.
-        car: Name of the car, for the record.
+        car: The car that was driven, for the record.
         start: (9,) pose to begin at; default: the policy's ``start``, or neutral.
         vestibular: Perception model; default: Zacharias'.
         dt: Time step, s.
@@ -111,7 +112,7 @@ def _trajectory(
     policy: Policy,
     cues: CueTrace,
     platform: Platform,
-    car: str,
+    car: Car | None,
     states: NDArray[Any],
     actions: NDArray[np.float64],
     seconds: NDArray[np.float64],
@@ -125,7 +126,7 @@ def _trajectory(
         maneuver=cues.name,
         policy=str(getattr(policy, "name", type(policy).__name__)),
         platform=platform.name,
-        car=car,
+        car=car.name if car else cues.source or cues.name,
         time=cues.time,
         f_wanted=wanted["force"],
         w_wanted=wanted["rate"],

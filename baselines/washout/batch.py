@@ -61,8 +61,7 @@ class WashoutBatch:
         self.shape = len(sets), len(drives)
         drive_of = np.tile(np.arange(len(drives)), len(sets))
         self.simulator = Simulator(platform, drives, drive_of=drive_of, dt=drives[0].dt)
-        machine = self.simulator.machines.numpy()[0]
-        if machine["has_lag"] or machine["has_dead_time"]:
+        if self.simulator.machines.numpy()[0]["has_dynamics"]:
             raise ConfigurationError(
                 "actuator dynamics must be unity in a washout batch; use rollout instead"
             )

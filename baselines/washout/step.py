@@ -1,8 +1,8 @@
-"""One step of the classical washout, Figures 2 and 3 of the paper, block by block.
+r"""One step of the classical washout, Figures 2 and 3 of the paper, block by block.
 
     omega_AA -> scale, limit -> T_S -> HPR -> beta1HP ----+-> SPLIT -> beta_H, psi_T
     f_AA -> scale, limit -> f1 -> LP -> N -> limit -> betaSL
-                        \\-> a2S -> HPS -> L_IS -> HPI -> Q' -> LPC -> C', S'
+                        \-> a2S -> HPS -> L_IS -> HPI -> Q' -> LPC -> C', S'
 
 All accelerations are outputs of the filters' own states. They are the machine's command, plus a gentle pull
 back to the algorithm's own reference, which is zero unless a limit has come between.

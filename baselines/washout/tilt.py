@@ -8,7 +8,7 @@ from ...envs.cues import GRAVITY
 from ...envs.precision import real, vec2
 
 BRAKING_SHARE = wp.constant(real(0.8))
-"""Share of the acceleration limit the approach counts on, so that braking in whole steps does not overshoot."""
+"""Share of the acceleration limit the approach counts on: braking in whole steps must not overshoot."""
 
 
 @wp.func

@@ -1,5 +1,4 @@
 """What the cab feels: specific force and rotation, from the model's own derivatives (Warp)."""
-# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
 """The kernel that drives a batch of cars through their plans, all time steps in one launch (Warp)."""
-# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
 """The driver: previews the path, steers along it, and keeps the speed with the pedals."""
-# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 

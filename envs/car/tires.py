@@ -1,5 +1,4 @@
 """Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill (Warp)."""
-# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 

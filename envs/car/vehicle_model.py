@@ -3,7 +3,6 @@
 The equations carry the tags of docs/car.md. Velocities are those of the point B of the roll axis under the
 c.g., in the plane of the road: x forward, y right, z down.
 """
-# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
 """State, parameters and inputs of the vehicle model, as the kernel holds them (Warp)."""
-# mypy: disable-error-code="untyped-decorator, valid-type"
 
 from __future__ import annotations
 

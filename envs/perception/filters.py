@@ -49,13 +49,13 @@ class Sensed:
 
 @wp.func
 def output(filter: ThirdOrder, x: vec3, u: real) -> real:
-    """Y = C x + D u."""
+    """Output now: y = C x + D u."""
     return wp.dot(filter.c, x) + filter.d * u
 
 
 @wp.func
 def advance(filter: ThirdOrder, x: vec3, u: real) -> vec3:
-    """x' = A x + B u."""
+    """State one sample later: x' = A x + B u."""
     return filter.a * x + filter.b * u
 
 

@@ -37,9 +37,10 @@ class Canals:
     def transfer_function(self, axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Numerator and denominator in s of one axis (0 roll, 1 pitch, 2 yaw)."""
         t_long = self.long[axis]
-        numerator = t_long * self.adaptation * np.polymul([1.0, 0.0, 0.0], [self.lead, 1.0])
+        gain = t_long * self.adaptation
+        numerator = [gain * self.lead, gain, 0.0, 0.0] if self.lead else [gain, 0.0, 0.0]
         slow = np.polymul([t_long, 1.0], [self.adaptation, 1.0])
-        return np.trim_zeros(numerator, "f"), np.polymul(slow, [self.short, 1.0])
+        return np.array(numerator), np.asarray(np.polymul(slow, [self.short, 1.0]), dtype=np.float64)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -60,7 +61,8 @@ class Otoliths:
 
     def transfer_function(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Numerator and denominator in s, of unit static gain."""
-        return np.array([self.lead, 1.0]), np.polymul([self.long, 1.0], [self.short, 1.0])
+        denominator = np.polymul([self.long, 1.0], [self.short, 1.0])
+        return np.array([self.lead, 1.0]), np.asarray(denominator, dtype=np.float64)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -38,11 +38,13 @@ class ActuatorDynamics:
 
 
 def lag_transition(dynamics: ActuatorDynamics, dt: float) -> NDArray[np.float64]:
-    """(2, 5) matrix from [y, ydot, u, udot, uddot] to [y, ydot] one step later, u being the set-point."""
+    """(2, 5) matrix from [y, ydot, u, udot, uddot] to [y, ydot] one step later, u being the set-point.
+
+    Zero where there is no lag; such a subsystem is not filtered.
+    """
     omega = dynamics.natural_frequency
     if omega is None:
-        unity = [[0.0, 0.0, 1.0, dt, 0.5 * dt * dt], [0.0, 0.0, 0.0, 1.0, dt]]
-        return np.array(unity)
+        return np.zeros((2, 5))
     system = np.zeros((5, 5))
     system[0, 1] = 1.0
     system[1, :3] = [-(omega**2), -2.0 * dynamics.damping * omega, omega**2]

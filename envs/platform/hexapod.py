@@ -150,7 +150,7 @@ def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3,
 @wp.func_grad(forward_kinematics)
 def adjoint_forward_kinematics(
     g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3, adjoint: vec6
-):
+) -> None:
     """Implicit function theorem: d pose / d extensions = J^-1; the first guess has no part."""
     pose = forward_kinematics(g, extensions, displacement, beta)
     s = vec3(pose[0], pose[1], pose[2])

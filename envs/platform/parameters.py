@@ -116,7 +116,7 @@ def machine_parameters(platform: Platform, dt: float) -> Any:
     machine.head = vec3(*(cab + np.array(platform.cab.head)))
     dynamics = _dynamics(platform)
     machine.lag = mat65(*np.concatenate([lag_transition(d, dt) for d in dynamics]).ravel())
-    machine.has_lag = int(any(d.natural_frequency is not None for d in dynamics))
-    machine.dead_steps = wp.vec3i(*dead_steps(platform, dt))
-    machine.has_dead_time = int(any(dead_steps(platform, dt)))
+    lags = [int(d.natural_frequency is not None) for d in dynamics]
+    machine.lags, machine.dead_steps = wp.vec3i(*lags), wp.vec3i(*dead_steps(platform, dt))
+    machine.has_dynamics = int(any(lags) or any(dead_steps(platform, dt)))
     return machine

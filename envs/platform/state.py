@@ -32,9 +32,9 @@ class Machine:
     cab: vec3  # D_o: reference point of the cab from the turntable's axis, turntable at 0
     head: vec3  # D_o + OP_SS: the driver's head
     lag: mat65  # transition of the three actuator dynamics, see actuators.py
-    has_lag: int
-    dead_steps: wp.vec3i  # dead time of carriage, legs, turntable in steps
-    has_dead_time: int
+    lags: wp.vec3i  # whether carriage, legs, turntable lag
+    dead_steps: wp.vec3i  # their dead times in steps
+    has_dynamics: int  # whether any of them lags or has a dead time
 
 
 @wp.struct

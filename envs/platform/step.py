@@ -51,7 +51,9 @@ def bounds_of(m: Machine, start: Motion, i: int, dt: real) -> vec2:
 
 @wp.func
 def limit_flag(m: Machine, start: Motion, i: int, asked: real, dt: real) -> wp.uint64:
-    """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask."""
+    """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask; none for a missing one."""
+    if m.position_max[i] <= m.position_min[i]:
+        return wp.uint64(0)
     code = active_limit(
         asked,
         start.position[i],
@@ -293,22 +295,37 @@ def actuate(
 
     ``delay[environment, k]`` is the set-point k + 1 steps before ``setpoint``.
     """
-    if m.has_lag == 0 and m.has_dead_time == 0:
+    if m.has_dynamics == 0:
         return setpoint
     after = motion
     # New vectors: changing entries of a copied one loses gradients in Warp.
     position = vec9()
     rate = vec9()
     for i in range(9):
-        steps = m.dead_steps[subsystem(i)]
+        k = subsystem(i)
+        steps = m.dead_steps[k]
         begin = delay[environment, steps]
-        ending = setpoint.rate[i]
+        later_position = setpoint.position[i]
+        later_rate = setpoint.rate[i]
         if steps > 0:
             later = delay[environment, steps - 1]
-            ending = later.rate[i]
-        lagged = lag(m, i, motion.position[i], motion.rate[i], begin.position[i], begin.rate[i], ending, dt)
-        position[i] = lagged[0]
-        rate[i] = lagged[1]
+            later_position = later.position[i]
+            later_rate = later.rate[i]
+        if m.lags[k] == 0:
+            position[i] = later_position
+            rate[i] = later_rate
+        else:
+            y = lag(
+                m, i, motion.position[i], motion.rate[i], begin.position[i], begin.rate[i], later_rate, dt
+            )
+            position[i] = y[0]
+            rate[i] = y[1]
     after.position = position
     after.rate = rate
+    if m.lags[1] == 0 and m.dead_steps[1] == 0:
+        after.displacement = setpoint.displacement
+        after.velocity = setpoint.velocity
+        after.beta = setpoint.beta
+        after.beta_rate = setpoint.beta_rate
+        return after
     return pose_from_legs(m, after, motion)
