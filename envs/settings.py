@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar, get_type_hints
 
 import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -33,7 +33,9 @@ def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:
         ConfigurationError: naming ``source``, each wrong field and, for an unknown one, the nearest known.
     """
     if not isinstance(values, dict):
-        raise ConfigurationError(f"{source}: expected fields of {cls.__name__}, found {type(values).__name__}")
+        raise ConfigurationError(
+            f"{source}: expected fields of {cls.__name__}, found {type(values).__name__}"
+        )
     try:
         return TypeAdapter(cls).validate_python(values)
     except ValidationError as error:
@@ -42,8 +44,16 @@ def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:
 
 def describe(error: ValidationError, cls: type[Any]) -> str:
     """One sentence a wrong field, with its path, what was found and what is allowed."""
-    known = [field.name for field in dataclasses.fields(cls)]
-    return "; ".join(_describe_one(dict(item), known) for item in error.errors())
+    return "; ".join(_describe_one(dict(item), _known_fields(cls, item["loc"])) for item in error.errors())
+
+
+def _known_fields(cls: type[Any], path: tuple[int | str, ...]) -> list[str]:
+    """Fields of the innermost configuration on the way to ``path``."""
+    for part in path[:-1]:
+        inner = get_type_hints(cls).get(str(part))
+        if isinstance(inner, type) and dataclasses.is_dataclass(inner):
+            cls = inner
+    return [field.name for field in dataclasses.fields(cls)]
 
 
 def _describe_one(item: dict[str, Any], known: list[str]) -> str:

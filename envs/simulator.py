@@ -111,7 +111,7 @@ class Simulator:
 
     @property
     def constants(self) -> list[Any]:
-        """The first arguments of every step kernel: machines, perception, drives, who has which, time step."""
+        """First arguments of every step kernel: machines, perception, drives, who has which, time step."""
         return [
             self.machines,
             self._perception,
@@ -200,7 +200,7 @@ class Simulator:
         """Advance every environment by one time step.
 
         Args:
-            action: (n, 9) accelerations in the order of ``AXES``, m/s^2 and rad/s^2; (9,) for one environment.
+            action: (n, 9) accelerations in the order of ``AXES``, m/s^2 and rad/s^2; or (9,) for one.
 
         Returns:
             The state, as :attr:`state`.

@@ -16,11 +16,13 @@ def replacing(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    os.fchmod(handle, 0o644)
     text = "b" not in mode
     try:
-        with os.fdopen(handle, mode, encoding="utf-8" if text else None, newline="" if text else None) as file:
+        with os.fdopen(
+            handle, mode, encoding="utf-8" if text else None, newline="" if text else None
+        ) as file:
             yield file
+        os.chmod(name, 0o644)
         os.replace(name, target)
     except BaseException:
         Path(name).unlink(missing_ok=True)

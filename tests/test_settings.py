@@ -162,3 +162,10 @@ def test_a_folder_in_the_way(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"file\.txt"):
         write_text(tmp_path / "file.txt", "text")
     assert os.listdir(tmp_path) == ["file.txt"]
+
+
+def test_an_unknown_field_of_an_inner_configuration_suggests_its_own_fields(tmp_path: Path) -> None:
+    path = tmp_path / "machine.yaml"
+    path.write_text("mass: 1\nspring: {stifness: 2}")
+    with pytest.raises(ConfigurationError, match=r"unknown field 'spring\.stifness'\. Did you mean"):
+        load(Machine, path)

@@ -137,7 +137,7 @@ class DiscreteFilter:
 
 
 def discretise(numerator: NDArray[np.float64], denominator: NDArray[np.float64], dt: float) -> DiscreteFilter:
-    """A transfer function sampled exactly for inputs that are straight lines between samples (first-order hold)."""
+    """A transfer function sampled exactly for inputs that are straight between samples."""
     system = signal.cont2discrete(signal.tf2ss(numerator, denominator), dt, method="foh")
     order = system[0].shape[0]
     a, b, c = np.zeros((3, 3)), np.zeros(3), np.zeros(3)

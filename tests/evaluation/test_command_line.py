@@ -151,7 +151,7 @@ HEADER = (
         (HEADER + "0,0,0,-9.81,0,0,0\n0.1,nan,0,-9.81,0,0,0\n", "specific_force is not finite at sample 1"),
         (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0,inf,0,0,0\n", "specific_force is not finite at sample 1"),
         (HEADER + "0.1,0,0,-9.81,0,0,0\n0,0,0,-9.81,0,0,0\n", "time does not increase at sample 1"),
-        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0\n", "row 3 has 3 cells"),
+        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0\n", "line 3 has 3 cells"),
         (HEADER + "0,0,0,-9.81,0,0,0\n0.1,x,0,-9.81,0,0,0\n", "could not convert string to float"),
     ],
 )
