@@ -1,0 +1,89 @@
+# Set-up, checks and evaluation. `make help` lists the targets.
+# Everything is installed into $(VENV), with the versions of constraints.txt.
+
+PYTHON ?= python3
+VENV ?= .venv
+OUT ?= results
+WORKERS ?= 2
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+PACKAGES := envs baselines evaluation train
+CHECKED := $(PACKAGES) tests benchmarks examples
+TYPES := build/types
+
+# Stamps: a target that finds its stamp newer than the requirements installs nothing.
+BASE := $(VENV)/.installed-base
+DEV := $(VENV)/.installed-dev
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
+.PHONY: help evaluate paper test lint types unit format bench constraints clean distclean
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@echo "  PYTHON=python3.12 chooses the interpreter, OUT=DIR where results go."
+
+evaluate: $(BASE) ## Drive all maneuvers with the default policies; tables, figures and a report
+	@$(BIN)/motion-cueing evaluate --out $(OUT)
+	@echo "Report: $(abspath $(OUT))/report.html"
+
+paper: $(BASE) ## Reproduce the paper's six cases, with a pass or a fail for each number
+	@$(BIN)/motion-cueing evaluate --paper --out $(OUT)/paper
+
+test: lint types unit ## Lint, check types and run the tests
+
+lint: $(DEV) ## Ruff: rules and format
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(DEV) $(TYPES)/motion_cueing ## mypy, strict
+	MYPYPATH=$(TYPES) $(BIN)/mypy --namespace-packages $(PACKAGES:%=-p motion_cueing.%)
+
+# Workers that meet a cold cache each compile into a folder of their own; Warp keeps the first.
+unit: $(DEV) ## The tests alone
+	$(BIN)/pytest -n $(WORKERS)
+
+format: $(DEV) ## Format the code and mend what ruff can mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(DEV) ## Measure speed; see docs/performance.md
+	$(BIN)/pytest benchmarks --benchmark-only
+
+constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject.toml; UPGRADE=1 for newer versions
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.10 --extra dev --extra train --no-annotate \
+		--custom-compile-command "make constraints" $(if $(UPGRADE),--upgrade) \
+		--output-file constraints.txt pyproject.toml
+
+clean: ## Remove results and caches
+	rm -rf $(OUT) build dist *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+
+distclean: clean ## The same, and the virtual environment
+	rm -rf $(VENV)
+
+# Type checkers see the folders under their installed names through this link.
+$(TYPES)/motion_cueing:
+	@mkdir -p $(TYPES)
+	@ln -sfn ../.. $@
+
+$(BIN)/python:
+	@command -v $(PYTHON) > /dev/null || { echo "make: $(PYTHON) not found; name a Python 3.10 or newer with PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+		{ echo "make: $$($(PYTHON) --version) is too old; name a Python 3.10 or newer with PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2> /dev/null || \
+		{ echo "make: $(PYTHON) has no venv module; install it (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1; }
+	@echo "Making $(VENV) with $$($(PYTHON) --version)"
+	@$(PYTHON) -m venv $(VENV)
+
+$(BASE): pyproject.toml constraints.txt | $(BIN)/python
+	@echo "Installing into $(VENV)"
+	@$(PIP) -e .
+	@touch $@
+
+$(DEV): pyproject.toml constraints.txt | $(BIN)/python
+	@echo "Installing into $(VENV), with the tools of development"
+	@$(PIP) -e '.[dev]'
+	@touch $(BASE) $@
