@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from motion_cueing.envs.platform import ACTUATORS, AXES, Platform, actuator_limits
@@ -110,7 +112,7 @@ def test_the_limits_of_a_carriage_axis_are_told_apart():
     batch.reset()
     assert bits(batch.step(along("carriage_y", 100.0)), "carriage_y") == ACCELERATION
     seen = [bits(batch.step(along("carriage_y", 3.0)), "carriage_y") for _ in range(600)]
-    changes = [seen[0]] + [b for a, b in zip(seen, seen[1:], strict=False) if a != b]
+    changes = [seen[0]] + [b for a, b in pairwise(seen) if a != b]
     assert changes == [0, VELOCITY, END]
     assert bits(batch.state, "carriage_x") == 0
 

@@ -1,4 +1,4 @@
-"""Whatever the commands, no leg, carriage or turntable leaves its limits in position, speed and acceleration."""
+"""Whatever the commands, no actuator leaves its limits in position, speed or acceleration."""
 
 from __future__ import annotations
 
