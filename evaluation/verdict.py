@@ -212,9 +212,10 @@ def _mean(values: Iterable[float]) -> float:
 def _explain(best: str, why: Advantage) -> str:
     if why.axis is None or why.axis_share is None or why.cause is None:
         return f"{why.over} is level with it (J = {why.cue_error:.3g})."
+    gained = why.axis_share * why.margin * why.cue_error
     text = (
-        f"Its J is {why.margin:.0%} below that of {why.over} ({why.cue_error:.3g}), mainly on {why.axis} "
-        f"({why.axis_share:.0%} of the difference): {_WORDS[why.cause][0]}."
+        f"Its J is {why.margin:.0%} below that of {why.over} ({why.cue_error:.3g}), mainly by {gained:.3g} less "
+        f"on {why.axis}: {_WORDS[why.cause][0]}."
     )
     if why.worse_axis is not None and why.worse_cause is not None:
         text += f" {best} is the worse of the two on {why.worse_axis}: {_WORDS[why.worse_cause][1]}."

@@ -80,8 +80,7 @@ class WashoutParameters:
         lpc: LPC FILT, which gives the carriage its part, or None to leave all to the hexapod.
         start_carriage: C'(0): where the carriage begins a drive, m.
         start_hexapod: S'(0): where the hexapod begins a drive, m from neutral.
-        follow_frequency: Natural frequency with which the machine is led back to the algorithm's own
-            reference after a limit was hit, rad/s.
+        follow_frequency: How fast machine and reference come together again after a limit was hit, rad/s.
     """
 
     name: str

@@ -5,7 +5,8 @@ r"""One step of the classical washout, Figures 2 and 3 of the paper, block by bl
                         \-> a2S -> HPS -> L_IS -> HPI -> Q' -> LPC -> C', S'
 
 All accelerations are outputs of the filters' own states. They are the machine's command, plus a gentle pull
-back to the algorithm's own reference, which is zero unless a limit has come between.
+back to the algorithm's own reference, and the reference is led back to the machine; both are zero unless a
+limit has come between.
 """
 
 from __future__ import annotations
@@ -230,6 +231,12 @@ def carriage_acceleration(p: Parameters, m: Memory, dt: real) -> vec2:
 
 
 @wp.func
+def wrapped(angle: real) -> real:
+    """An angle within +-pi."""
+    return wp.atan2(wp.sin(angle), wp.cos(angle))
+
+
+@wp.func
 def pull(p: Parameters, error: real, error_rate: real) -> real:
     """Acceleration that leads the machine back to the reference, critically damped."""
     w = p.follow_frequency
@@ -243,7 +250,6 @@ def command_axes(p: Parameters, m: Memory, seen: Reading, r: Rotation, q: vec3, 
     sway = m.displacement[1] - m.carriage[1]
     surge_rate = m.velocity[0] - m.carriage_rate[0]
     sway_rate = m.velocity[1] - m.carriage_rate[1]
-    turned = r.psi_t - seen.psi_t
     return vec9(
         c[0] + pull(p, m.carriage[0] - seen.carriage[0], m.carriage_rate[0] - seen.carriage_rate[0]),
         c[1] + pull(p, m.carriage[1] - seen.carriage[1], m.carriage_rate[1] - seen.carriage_rate[1]),
@@ -253,8 +259,7 @@ def command_axes(p: Parameters, m: Memory, seen: Reading, r: Rotation, q: vec3, 
         r.beta_acceleration[0] + pull(p, r.beta[0] - seen.beta[0], r.beta_rate[0] - seen.beta_rate[0]),
         r.beta_acceleration[1] + pull(p, r.beta[1] - seen.beta[1], r.beta_rate[1] - seen.beta_rate[1]),
         r.beta_acceleration[2] + pull(p, r.beta[2] - seen.beta[2], r.beta_rate[2] - seen.beta_rate[2]),
-        r.psi_t_acceleration
-        + pull(p, wp.atan2(wp.sin(turned), wp.cos(turned)), r.psi_t_rate - seen.psi_t_rate),
+        r.psi_t_acceleration + pull(p, wrapped(r.psi_t - seen.psi_t), r.psi_t_rate - seen.psi_t_rate),
     )
 
 
@@ -298,6 +303,34 @@ def advance_translation(m: Memory, q: vec3, c: vec2, dt: real) -> Memory:
 
 
 @wp.func
+def led_back(p: Parameters, m: Memory, seen: Reading, r: Rotation, after: Memory, dt: real) -> Memory:
+    """The references led towards a machine that a limit held back, so that nothing winds up.
+
+    Without a limit the machine is where the reference is, and this changes nothing.
+    """
+    k = p.follow_frequency * dt
+    c = seen.carriage - m.carriage
+    c_rate = seen.carriage_rate - m.carriage_rate
+    moved_by = vec3(seen.carriage[0], seen.carriage[1], real(0.0)) + seen.displacement - m.displacement
+    moved_rate = vec3(seen.carriage_rate[0], seen.carriage_rate[1], real(0.0)) + seen.velocity - m.velocity
+    b = seen.beta - r.beta
+    b_rate = seen.beta_rate - r.beta_rate
+    turned = wrapped(seen.psi_t - r.psi_t) / p.turntable_gain
+    turned_rate = (seen.psi_t_rate - r.psi_t_rate) / p.turntable_gain
+    zero = real(0.0)
+    out = after
+    out.carriage = after.carriage + k * c * p.carriage_share
+    out.carriage_rate = after.carriage_rate + k * c_rate * p.carriage_share
+    out.displacement = after.displacement + k * moved_by
+    out.velocity = after.velocity + k * moved_rate
+    out.tilt = after.tilt + k * vec2(b[0], b[1])
+    out.tilt_rate = after.tilt_rate + k * vec2(b_rate[0], b_rate[1])
+    out.beta_hp = after.beta_hp + k * vec3(zero, zero, b[2] + turned)
+    out.beta_hp_rate = after.beta_hp_rate + k * vec3(zero, zero, b_rate[2] + turned_rate)
+    return out
+
+
+@wp.func
 def initial_memory(p: Parameters, seen: Reading) -> Memory:
     """Filters at rest, their references where the machine is: C'(0), S'(0) and the tilt of the start pose."""
     m = Memory()
@@ -334,6 +367,7 @@ def washout(p: Parameters, m: Memory, seen: Reading, dt: real) -> Command:
     after = advance_translation(linear.memory, q, c, dt)
     after = advance_rotation(p, after, high_passed, alpha, tilt, dt)
     after = advance_low_pass(p, after, f1, dt)
+    after = led_back(p, m, seen, r, after, dt)
 
     out = Command()
     out.action = command_axes(p, m, seen, r, q, c)
