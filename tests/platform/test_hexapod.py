@@ -95,7 +95,7 @@ REACH = {
     "pitch": (4, np.radians([28.5, -27.8])),
     "yaw": (5, np.radians([49.0, -49.0])),
 }
-"""Single-axis envelope of the paper's machine, computed elsewhere; rounded to mm and to half a degree or so."""
+"""Single-axis envelope of the paper's machine, computed elsewhere; rounded to mm and about half a degree."""
 
 
 @pytest.mark.parametrize("axis", REACH)

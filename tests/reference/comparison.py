@@ -25,6 +25,13 @@ def motion_of(rows: Rows) -> MotionState:
     )
 
 
+def bits(rows: Rows) -> bytes:
+    """The bytes of all fields of structured rows, without the padding between them."""
+    if rows.dtype.names is None:
+        return np.ascontiguousarray(rows).tobytes()
+    return b"".join(bits(rows[name]) for name in rows.dtype.names)
+
+
 def adopt(reference: ReferenceSimulator, kernel: Rows) -> None:
     """Let the reference go on from where the kernel's machine is."""
     reference.state.setpoint = motion_of(kernel["setpoint"])
