@@ -7,7 +7,7 @@ OUT ?= results
 WORKERS ?= 2
 
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
 PACKAGES := envs baselines evaluation train
 CHECKED := $(PACKAGES) tests benchmarks examples
 TYPES := build/types
@@ -27,7 +27,6 @@ help: ## List the targets
 
 evaluate: $(BASE) ## Drive all maneuvers with the default policies; tables, figures and a report
 	@$(BIN)/motion-cueing evaluate --out $(OUT)
-	@echo "Report: $(abspath $(OUT))/report.html"
 
 paper: $(BASE) ## Reproduce the paper's six cases, with a pass or a fail for each number
 	@$(BIN)/motion-cueing evaluate --paper --out $(OUT)/paper
@@ -53,7 +52,7 @@ bench: $(DEV) ## Measure speed; see docs/performance.md
 	$(BIN)/pytest benchmarks --benchmark-only
 
 constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject.toml; UPGRADE=1 for newer versions
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/python -m pip install -qq --disable-pip-version-check uv
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.10 --extra dev --extra train --no-annotate \
 		--custom-compile-command "make constraints" $(if $(UPGRADE),--upgrade) \
 		--output-file constraints.txt pyproject.toml
