@@ -1,0 +1,217 @@
+"""The washout as a whole: what the paper derives of it, and how it behaves as a policy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy, make_policy, policy_names
+from motion_cueing.baselines.washout import (
+    HighPass,
+    LowPass,
+    TiltCoordination,
+    WashoutParameters,
+    load_washout,
+    washout_presets,
+)
+from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
+from motion_cueing.envs.observation import OBSERVATION_SIZE
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import load, save
+from motion_cueing.evaluation import rollout
+from scipy import signal
+
+from .drives import boundless, trace
+
+OPEN = (HighPass(), HighPass(), HighPass())
+
+
+def weave(t):
+    ramp = np.clip((t - 0.5) / 2.0, 0.0, 1.0)
+    return ramp[:, None] * np.column_stack([1.5 * np.sin(0.9 * t), 2.0 * np.sin(1.3 * t)])
+
+
+def yawing(t):
+    ramp = np.clip((t - 0.5) / 2.0, 0.0, 1.0)
+    return ramp[:, None] * np.column_stack(
+        [0.02 * np.sin(2.0 * t), 0.02 * np.sin(1.6 * t), 0.3 * np.sin(0.7 * t)]
+    )
+
+
+def open_washout(**changes) -> WashoutParameters:
+    values = {
+        "name": "open", "hpr": OPEN, "tilt": None, "hps": OPEN[:2], "hpi": OPEN,
+        "lpc": LowPass(8.0), "rate_bandwidth": 190.0, "rate_limit": (5.0, 5.0, 5.0),
+    } | changes  # fmt: skip
+    return WashoutParameters(**values)
+
+
+def test_without_filters_the_driver_feels_the_car():
+    """Eqs. (41) to (46): every block opened, f_SS = f'_AA and omega_SS = omega'_AA, turning and tilting."""
+    drive = trace(12.0, weave, yawing)
+    felt = rollout(ClassicalWashout(open_washout()), drive, boundless())
+    assert not felt.limits_active.any()
+    # The action of a sample acts until the next one: what is felt is one sample old.
+    error = felt.f_felt[1:] - felt.f_wanted[:-1]
+    assert np.abs(error[5:]).max() < 0.03
+    assert np.abs(felt.w_felt[2:] - felt.w_wanted[:-2])[5:].max() < 0.01
+    assert np.abs(felt.turntable).max() > 0.5
+
+
+def test_scaling_and_limiting_of_the_inputs():
+    scaled = replace(open_washout(), force_scale=(0.5, 1.0, 1.0), force_limit=(10.0, 1.0, 10.0))
+    felt = rollout(ClassicalWashout(scaled), trace(10.0, weave), boundless())
+    np.testing.assert_allclose(felt.f_felt[6:, 0], 0.5 * felt.f_wanted[5:-1, 0], atol=0.02)
+    np.testing.assert_allclose(felt.f_felt[6:, 1], np.clip(felt.f_wanted[5:-1, 1], -1.0, 1.0), atol=0.02)
+
+
+def test_the_translational_path_is_hps_times_hpi():
+    """Frequency response of the force path against the analytic product of the two filters."""
+    omega, w_s, w_i = 1.7, 0.6, 0.3
+    drive = trace(80.0, lambda t: np.column_stack([np.zeros_like(t), 0.8 * np.sin(omega * t)]))
+    filtered = open_washout(
+        hps=(HighPass(2, w_s),) * 2, hpi=(HighPass(1, w_i), HighPass(1, w_i), HighPass(2, 2.0))
+    )
+    felt = rollout(ClassicalWashout(filtered), drive, boundless())
+    late = felt.time > 40.0
+    basis = np.column_stack([np.sin(omega * felt.time[late]), np.cos(omega * felt.time[late])])
+    (a, b), *_ = np.linalg.lstsq(basis, felt.f_felt[late, 1], rcond=None)
+    s = 1j * omega
+    expected = 0.8 * s**2 / (s + w_s) ** 2 * s / (s + w_i) * np.exp(-0.5 * s * 0.01)
+    assert a + 1j * b == pytest.approx(expected, abs=0.01)
+
+
+def test_the_carriage_takes_the_low_pass_of_the_whole():
+    """Eqs. (49) to (51): C' = LPC Q', and carriage and hexapod add up."""
+    felt = rollout(ClassicalWashout(open_washout(lpc=LowPass(3.0))), trace(8.0, weave), boundless())
+    whole = felt.carriage[:, 1] + felt.hexapod[:, 1]
+    _, low, _ = signal.lsim(([9.0], [1.0, 6.0, 9.0]), whole, felt.time)
+    np.testing.assert_allclose(felt.carriage[:, 1], low, atol=0.02 * np.ptp(whole))
+
+
+def test_without_turntable_or_carriage_they_stand_still():
+    still = replace(load_washout("classical"), turntable_share=0.0, lpc=None)
+    felt = rollout(ClassicalWashout(still), trace(6.0, weave, yawing))
+    assert not felt.turntable.any()
+    assert not felt.carriage.any()
+    assert np.abs(felt.hexapod[:, 5]).max() > 0.05
+
+
+def test_a_sustained_force_ends_as_tilt_at_the_limited_rate():
+    step = trace(20.0, lambda t: np.column_stack([np.where(t > 1.0, 1.5, 0.0), np.zeros_like(t)]))
+    tilt = TiltCoordination(rate=np.radians(3.0), acceleration=np.radians(8.0))
+    felt = rollout(ClassicalWashout(replace(load_washout("est1"), tilt=tilt)), step)
+    assert felt.f_felt[-1, 0] == pytest.approx(1.5, abs=0.05)
+    assert np.abs(felt.hexapod_rate[:, 3:5]).max() <= np.radians(3.0) + 1e-9
+
+
+def test_a_violent_drive_meets_limits_and_the_machine_comes_back():
+    """No windup: seconds after the drive has calmed down the machine is where an unhurt one would be."""
+
+    def burst(t):
+        on = (t > 1.0) & (t < 6.0)
+        return np.column_stack([np.where(on, 9.0, 0.0), np.where(on, -6.0, 0.0)])
+
+    parameters = replace(load_washout("classical"), force_scale=(1.0, 1.0, 1.0), hps=OPEN[:2])
+    felt = rollout(ClassicalWashout(parameters), trace(60.0, burst))
+    assert felt.limits_active.any(axis=1).mean() > 0.02
+    assert np.abs(felt.carriage[-1]).max() < 0.5
+    assert np.abs(felt.hexapod[-1, :2]).max() < 0.05
+    assert not felt.limits_active[-500:].any()
+
+
+def test_it_begins_where_the_machine_is():
+    start = np.array([5.0, -3.0, 0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 2.0])
+    felt = rollout(ClassicalWashout("est1"), trace(5.0), start=start)
+    np.testing.assert_allclose(felt.turntable, 2.0, atol=1e-6)
+    np.testing.assert_allclose(felt.f_felt[1], [0.0, 0.0, -9.81], atol=0.6)
+    # LPC hands the hexapod's offset over to the carriage; the sum stays.
+    np.testing.assert_allclose(felt.carriage[-1] + felt.hexapod[-1, :2], [5.1, -2.95], atol=1e-3)
+
+
+def test_its_start_pose_is_a_parameter():
+    washout = ClassicalWashout(
+        replace(load_washout("est1"), start_carriage=(4.0, 0.0), start_hexapod=(0.0, 0.1, 0.0))
+    )
+    felt = rollout(washout, trace(1.0))
+    np.testing.assert_allclose(felt.carriage[0], [4.0, 0.0])
+    np.testing.assert_allclose(felt.hexapod[0, :3], [0.0, 0.1, 0.0])
+
+
+@pytest.mark.parametrize("name", washout_presets())
+def test_presets_round_trip_through_yaml(name, tmp_path):
+    preset = load_washout(name)
+    assert preset.name == name
+    assert preset.description
+    save(preset, tmp_path / "copy.yaml")
+    assert load(WashoutParameters, tmp_path / "copy.yaml") == preset
+
+
+def test_a_batch_is_its_rows_and_the_state_is_not_touched():
+    rng = np.random.default_rng(3)
+    washout = ClassicalWashout("classical")
+    observations = rng.normal(size=(2, 4, OBSERVATION_SIZE)) * 0.1
+    first, state = washout.predict(observations[0])
+    kept = state.copy()
+    both, _ = washout.predict(observations[1], state, np.zeros(4, dtype=bool))
+    np.testing.assert_array_equal(state, kept)
+    for i in range(4):
+        alone, alone_state = washout.predict(observations[0, i])
+        np.testing.assert_array_equal(alone, first[i])
+        again, _ = washout.predict(observations[1, i], alone_state, np.zeros(1, dtype=bool))
+        np.testing.assert_array_equal(again, both[i])
+    restarted, _ = washout.predict(observations[0], state, np.ones(4, dtype=bool))
+    np.testing.assert_array_equal(restarted, first)
+
+
+@pytest.mark.parametrize("name", policy_names())
+def test_every_policy_keeps_the_protocol(name):
+    policy = make_policy(name, get_platform("paper"))
+    assert isinstance(policy, Policy)
+    action, _ = policy.predict(np.zeros(OBSERVATION_SIZE))
+    assert action.shape == (9,)
+    action, _ = policy.predict(np.zeros((3, OBSERVATION_SIZE)))
+    assert action.shape == (3, 9)
+
+
+def test_no_motion_does_not_move():
+    felt = rollout(NoMotion(), trace(3.0, weave, yawing))
+    assert not felt.applied.any()
+    np.testing.assert_array_equal(felt.f_felt, np.tile([0.0, 0.0, -9.81], (len(felt.time), 1)))
+
+
+def test_a_policy_from_a_file(tmp_path):
+    save(replace(load_washout("est1"), name="mine"), tmp_path / "mine.yaml")
+    assert make_policy(tmp_path / "mine.yaml", get_platform("paper")).name == "mine"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("name: x\nhpz: 1", "unknown field 'hpz'. Did you mean"),
+        ("name: x\nturntable_share: 2", "turntable_share"),
+        ("name: x\nhps: [{order: 3}, {order: 0}]", "hps.0.order"),
+        ("name: x\nlpc: {frequency: -1}", "lpc.frequency"),
+        ("name: x\nforce_scale: [1, .nan, 1]", "force_scale.1"),
+        ("description: x", "'name' is missing"),
+        ("- 1", "expected fields"),
+    ],
+)
+def test_broken_files_say_which_field(text, told, tmp_path):
+    (tmp_path / "bad.yaml").write_text(text)
+    with pytest.raises(ConfigurationError) as error:
+        load_washout(tmp_path / "bad.yaml")
+    assert told in str(error.value)
+
+
+def test_unknown_names_and_broken_observations():
+    with pytest.raises(UnknownNameError, match="Did you mean classical"):
+        make_policy("clasical", get_platform("paper"))
+    with pytest.raises(DataError, match="cannot be read"):
+        make_policy("missing.yaml", get_platform("paper"))
+    washout = ClassicalWashout("est1")
+    with pytest.raises(DataError, match="shape"):
+        washout.predict(np.zeros(7))
+    with pytest.raises(DataError, match="not finite"):
+        washout.predict(np.full(OBSERVATION_SIZE, np.nan))
