@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .cues import CueTrace
 from .errors import ActionError, ConfigurationError, DataError
+from .mirror import Mirror
 from .perception.filters import Vestibular, vestibular_parameters
 from .perception.models import VestibularModel, get_vestibular_model
 from .platform.kinematics import legs_of_pose
@@ -80,9 +81,14 @@ class Simulator:
         self.machines = _structs(Machine, [machine_parameters(p, self.dt) for p in self.platforms], device)
         perception = [vestibular_parameters(self.vestibular, self.dt)]
         self._perception = _structs(Vestibular, perception, device)
-        self._drives = upload_drives(self.drives, self.platforms[0], self.dt, device)
-        self.machine_of = wp.array(self.platform_of, dtype=int, device=device)
-        self._drive_of = wp.array(self.drive_of, dtype=int, device=device)
+        self._drives = upload_drives(self.drives, self.dt, device)
+        kinds = {"machine_of": int, "drive_of": int, "sample": int, "start": vec9, "mask": wp.bool}
+        self._placing = {name: Mirror(n, kind, device) for name, kind in kinds.items()}
+        self._placing["machine_of"].view[...] = self.platform_of
+        self._placing["drive_of"].view[...] = self.drive_of
+        for name in ("machine_of", "drive_of"):
+            self._placing[name].push()
+        self.machine_of = self._placing["machine_of"].array
         depth = 1 + max(max(dead_steps(p, self.dt)) for p in self.platforms)
         self._states = [wp.zeros(n, dtype=State, device=device) for _ in range(2)]
         self._delays = [wp.zeros((n, depth), dtype=SetPoint, device=device) for _ in range(2)]
@@ -117,7 +123,7 @@ class Simulator:
             self._perception,
             self._drives,
             self.machine_of,
-            self._drive_of,
+            self._placing["drive_of"].array,
             real(self.dt),
         ]
 
@@ -171,19 +177,35 @@ class Simulator:
         samples = np.broadcast_to(0 if sample is None else np.asarray(sample, dtype=np.int32), (self.n,))
         chosen = np.broadcast_to(True if mask is None else np.asarray(mask, dtype=bool), (self.n,))
         self._check_start(poses, chosen)
+        self.place(chosen, sample=samples, start=poses)
+        return self.state
+
+    def place(self, mask: NDArray[np.bool_], **where: NDArray[Any]) -> None:
+        """Put environments at rest, unchecked.
+
+        Args:
+            mask: (n,) environments to place.
+            **where: ``sample`` (n,) and ``start`` (n, 9) as in :meth:`reset`; ``drive_of`` and
+                ``machine_of`` (n,) move the masked environments to other drives and machines.
+        """
+        self._placing["mask"].view[...] = mask
+        self._placing["mask"].push()
+        for name, values in where.items():
+            mirror = self._placing[name]
+            mirror.view[mask] = values[mask]
+            mirror.push()
+        self.drive_of = self._placing["drive_of"].view
+        self.platform_of = self._placing["machine_of"].view
         wp.launch(
             reset_forward,
             self.n,
             inputs=[
                 *self.constants[:-1],
-                wp.array(samples, dtype=int, device=self.device),
-                wp.array(poses, dtype=vec9, device=self.device),
-                wp.array(chosen, dtype=wp.bool, device=self.device),
+                *(self._placing[name].array for name in ("sample", "start", "mask")),
             ],
             outputs=[self._states[self._now], self._delays[self._now]],
             device=self.device,
         )
-        return self.state
 
     def _check_start(self, poses: NDArray[np.float64], chosen: NDArray[np.bool_]) -> None:
         limits = self.machines.numpy()
@@ -208,7 +230,10 @@ class Simulator:
         Raises:
             ActionError: a wrong shape, or a value that is not finite; nothing has moved then.
         """
-        values = np.asarray(action, dtype=FLOAT)
+        try:
+            values = np.asarray(action, dtype=FLOAT)
+        except (TypeError, ValueError):
+            raise ActionError(f"action is not an array of ({self.n}, {N_AXES}) numbers") from None
         if values.shape != (self.n, N_AXES) and not (self.n == 1 and values.shape == (N_AXES,)):
             raise ActionError(f"action has shape {values.shape}, expected ({self.n}, {N_AXES})")
         if not np.isfinite(values).all():
@@ -228,8 +253,8 @@ class Simulator:
         self._now = 1 - self._now
 
 
-def upload_drives(drives: Sequence[CueTrace], platform: Platform, dt: float, device: Any) -> Any:
-    """The kernel's :class:`~.state.Drives`; the head is where the platform's cab has it.
+def upload_drives(drives: Sequence[CueTrace], dt: float, device: Any) -> Any:
+    """The kernel's :class:`~.state.Drives`.
 
     Raises:
         DataError: a drive has another time step than ``dt``.
@@ -243,7 +268,7 @@ def upload_drives(drives: Sequence[CueTrace], platform: Platform, dt: float, dev
     fields = {
         "force": [drive.specific_force for drive in drives],
         "rate": [drive.angular_velocity for drive in drives],
-        "head_force": [drive.at_point(platform.cab.head) for drive in drives],
+        "rate_derivative": [drive.angular_acceleration for drive in drives],
     }
     for name, parts in fields.items():
         setattr(uploaded, name, wp.array(np.concatenate(parts), dtype=vec3, device=device))

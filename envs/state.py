@@ -41,6 +41,6 @@ class Drives:
 
     force: wp.array(dtype=vec3)
     rate: wp.array(dtype=vec3)
-    head_force: wp.array(dtype=vec3)
+    rate_derivative: wp.array(dtype=vec3)
     first: wp.array(dtype=int)  # of each drive
     length: wp.array(dtype=int)

@@ -17,13 +17,17 @@ from .state import Cues, Drives, State
 
 
 @wp.func
-def wanted_cues(drives: Drives, drive: int, sample: int) -> Cues:
-    """The car's cues at a sample of a drive; its last one after the end."""
+def wanted_cues(m: Machine, drives: Drives, drive: int, sample: int) -> Cues:
+    """The car's cues at a sample of a drive (its last one after the end), the head as in the machine's cab."""
     i = drives.first[drive] + wp.min(sample, drives.length[drive] - 1)
     cues = Cues()
     cues.force = drives.force[i]
     cues.rate = drives.rate[i]
-    cues.head_force = drives.head_force[i]
+    arm = m.head - m.cab
+    omega = cues.rate
+    cues.head_force = (
+        cues.force + wp.cross(drives.rate_derivative[i], arm) + wp.cross(omega, wp.cross(omega, arm))
+    )
     return cues
 
 
@@ -63,7 +67,7 @@ def initial_state(m: Machine, v: Vestibular, drives: Drives, drive: int, sample:
     state.sample = sample
     state.motion = rest_motion(m, start)
     state.setpoint = state.motion
-    state.wanted = wanted_cues(drives, drive, sample)
+    state.wanted = wanted_cues(m, drives, drive, sample)
     state.felt = felt_cues(m, state.motion, vec9())
     state.vestibular_wanted = rested(v, state.wanted.head_force, state.wanted.rate)
     state.vestibular_felt = rested(v, state.felt.head_force, state.felt.rate)
@@ -95,7 +99,7 @@ def next_state(
     after.limits = commanded.limits
     after.motion = motion
     after.acceleration = acceleration
-    after.wanted = wanted_cues(drives, drive, after.sample)
+    after.wanted = wanted_cues(m, drives, drive, after.sample)
     after.felt = felt_cues(m, motion, acceleration)
     after.vestibular_wanted = advance_vestibular(
         v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate

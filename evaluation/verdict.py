@@ -214,8 +214,8 @@ def _explain(best: str, why: Advantage) -> str:
         return f"{why.over} is level with it (J = {why.cue_error:.3g})."
     gained = why.axis_share * why.margin * why.cue_error
     text = (
-        f"Its J is {why.margin:.0%} below that of {why.over} ({why.cue_error:.3g}), mainly by {gained:.3g} less "
-        f"on {why.axis}: {_WORDS[why.cause][0]}."
+        f"Its J is {why.margin:.0%} below that of {why.over} ({why.cue_error:.3g}), mainly by "
+        f"{gained:.3g} less on {why.axis}: {_WORDS[why.cause][0]}."
     )
     if why.worse_axis is not None and why.worse_cause is not None:
         text += f" {best} is the worse of the two on {why.worse_axis}: {_WORDS[why.worse_cause][1]}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.platform import Carriage, Platform, Turntable, get_platform
 

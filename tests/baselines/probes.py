@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import warp as wp
+
 from motion_cueing.baselines.washout.filters import HighPassParameters, high_pass, low_pass, moved
 from motion_cueing.baselines.washout.tilt import limited_tilt
 from motion_cueing.envs.precision import real, vec2, vec3

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
+
 from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy, make_policy, policy_names
 from motion_cueing.baselines.washout import (
     HighPass,
@@ -20,7 +22,6 @@ from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import load, save
 from motion_cueing.evaluation import rollout
-from scipy import signal
 
 from .drives import boundless, trace
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from motion_cueing.baselines.washout import (
     ClassicalWashout,
     HighPass,

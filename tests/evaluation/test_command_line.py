@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import MotionCueingError
 from motion_cueing.evaluation import evaluate_command

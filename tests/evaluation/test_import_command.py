@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tyro
+
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.car.log_columns import parse_columns
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError

@@ -7,6 +7,7 @@ from math import radians
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs.platform import ACTUATORS
 from motion_cueing.envs.settings import from_dict, to_dict
 from motion_cueing.evaluation.criteria import Criteria

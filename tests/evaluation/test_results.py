@@ -8,6 +8,7 @@ import re
 import struct
 
 import pytest
+
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.evaluation.figures import maneuver_figure
 from motion_cueing.evaluation.metrics import CUE_AXES, measure

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from motion_cueing.evaluation import signals
 from scipy import stats
+
+from motion_cueing.evaluation import signals
 
 VALUES = st.floats(-10.0, 10.0, allow_subnormal=False)
 SIGNAL = arrays(np.float64, 60, elements=VALUES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ActionError, DataError
 from motion_cueing.evaluation.metrics import measure

@@ -6,6 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs import storage
 from motion_cueing.envs.errors import DataError
 from motion_cueing.evaluation.trajectory import LimitTable, Trajectory

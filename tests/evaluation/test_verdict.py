@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from motion_cueing.evaluation.metrics import measure
 from motion_cueing.evaluation.verdict import advantage, judge, judge_suite, terms
 
