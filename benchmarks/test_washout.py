@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.baselines.washout.parameters import load_washout
 from motion_cueing.envs.car.maneuvers import get_maneuver, maneuver_names

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import signal
+
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.envs.perception import get_vestibular_model, vestibular_model_names
@@ -11,7 +13,6 @@ from motion_cueing.envs.perception.models import discretise
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import from_dict, to_dict
 from motion_cueing.envs.simulator import Simulator
-from scipy import signal
 
 DT = 0.01
 S = np.poly1d([1.0, 0.0])

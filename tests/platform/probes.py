@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+
 from motion_cueing.baselines.washout import tilt
 from motion_cueing.envs.platform import Hexapod, cab, frames, hexapod, parameters
 from motion_cueing.envs.precision import mat33, mat63, real, vec2, vec3, vec6

@@ -7,6 +7,7 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
+
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import Platform, actuator_limits
 from motion_cueing.envs.simulator import Simulator

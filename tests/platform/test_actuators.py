@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
 from motion_cueing.envs.platform import ActuatorDynamics, legs_of_pose
 from motion_cueing.envs.platform.actuators import lag_transition
-from scipy.integrate import solve_ivp
 
 from ..reference.actuators import lag
 from ..reference.comparison import bits

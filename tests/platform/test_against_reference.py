@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import ActuatorDynamics, Platform
 from motion_cueing.envs.simulator import Simulator

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs.platform import ACTUATORS, AXES, Platform, actuator_limits
 
 from .machines_under_test import DT, PRESETS

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
 from motion_cueing.envs.errors import DataError, GeometryError
 from motion_cueing.envs.platform import Platform, legs_of_pose, pose_of_legs
-from scipy.spatial.transform import Rotation
 
 from ..reference import MachineModel
 from ..reference import kinematics as plain

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from motion_cueing.envs.platform import Platform
 
 from .machines_under_test import PRESETS, sluggish

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from pydantic import ValidationError
+
 from motion_cueing.envs.errors import ConfigurationError, DataError, GeometryError, UnknownNameError
 from motion_cueing.envs.platform import (
     ActuatorDynamics,
@@ -21,7 +23,6 @@ from motion_cueing.envs.platform import (
 )
 from motion_cueing.envs.platform.presets import neutral_height, paired_hexapod
 from motion_cueing.envs.settings import save, to_dict
-from pydantic import ValidationError
 
 from .machines_under_test import PRESETS, sluggish
 

@@ -7,6 +7,7 @@ left decays as the homogeneous solution, critically or over-damped.
 from __future__ import annotations
 
 import numpy as np
+
 from motion_cueing.envs.platform import ActuatorDynamics
 
 from .frames import Floats

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from motion_cueing.envs.cues import CueTrace
 from numpy.typing import NDArray
+
+from motion_cueing.envs.cues import CueTrace
 
 from .setpoint import MotionState
 from .simulator import ReferenceSimulator, ReferenceState

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from motion_cueing.envs.perception import VestibularModel
 from scipy import signal
+
+from motion_cueing.envs.perception import VestibularModel
 
 from .frames import Floats
 

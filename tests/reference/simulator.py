@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
+
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.perception import VestibularModel, get_vestibular_model
 from motion_cueing.envs.platform import Platform
