@@ -9,11 +9,12 @@ import sys
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy
 from motion_cueing.envs.car import get_maneuver
 from motion_cueing.envs.observation import read
 from motion_cueing.evaluation import measure, rollout
-from numpy.typing import NDArray
 
 
 class CarriageOnSprings:
