@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.cues import CSV_COLUMNS, read_table
 from motion_cueing.envs.errors import DataError, MotionCueingError

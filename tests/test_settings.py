@@ -13,6 +13,8 @@ from typing import Literal
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic.dataclasses import dataclass
+
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.settings import (
     STRICT,
@@ -25,7 +27,6 @@ from motion_cueing.envs.settings import (
     to_dict,
 )
 from motion_cueing.envs.storage import replacing, write_bytes, write_text
-from pydantic.dataclasses import dataclass
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -11,48 +11,49 @@ from __future__ import annotations
 
 import warp as wp
 
-from ..precision import real, vec2, vec3, vec6, vec9
+from ..precision import real, vec3, vec6, vec9
 from .actuators import lag, subsystem
-from .hexapod import (
-    NEWTON_TOLERANCE,
-    determinant,
-    forward_kinematics,
-    leg_extensions,
-    leg_jacobian,
-    leg_rates,
-    platform_rates,
-)
+from .hexapod import forward_kinematics, leg_extensions, leg_jacobian, leg_rates, platform_rates
 from .limiter import active_limit, is_safe, rate_bounds
+from .singularity import keeps_clear
 from .state import Machine, Motion, SetPoint, Step
 
-NEARLY_SINGULAR = wp.constant(real(0.15))
-"""Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
 
-FAR_FROM_SINGULAR = wp.constant(real(0.75))
-"""Clearance from which braking is taken not to lead to a singular pose."""
+@wp.struct
+class Bounds:
+    """Least and greatest speed of every actuator after a step, by :func:`~.limiter.rate_bounds`."""
 
-NEIGHBOURHOOD = wp.constant(real(0.35))
-"""Largest change of an Euler angle while the legs brake, rad; more means a singular pose between."""
-
-
-@wp.func
-def bounds_of(m: Machine, start: Motion, i: int, dt: real) -> vec2:
-    """:func:`rate_bounds` of actuator ``i``."""
-    return rate_bounds(
-        start.position[i],
-        start.rate[i],
-        m.position_min[i],
-        m.position_max[i],
-        m.velocity[i],
-        m.acceleration[i],
-        dt,
-    )
+    lower: vec9
+    upper: vec9
 
 
 @wp.func
-def limit_flag(m: Machine, start: Motion, i: int, asked: real, dt: real) -> wp.uint64:
+def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
+    """The bounds of all actuators."""
+    lower = vec9()
+    upper = vec9()
+    for i in range(9):
+        pair = rate_bounds(
+            start.position[i],
+            start.rate[i],
+            m.position_min[i],
+            m.position_max[i],
+            m.velocity[i],
+            m.acceleration[i],
+            dt,
+        )
+        lower[i] = pair[0]
+        upper[i] = pair[1]
+    bounds = Bounds()
+    bounds.lower = lower
+    bounds.upper = upper
+    return bounds
+
+
+@wp.func
+def limit_flag(m: Machine, start: Motion, bounds: Bounds, i: int, asked: real, dt: real) -> wp.uint64:
     """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask; none for a missing one."""
-    if m.position_max[i] <= m.position_min[i]:
+    if (asked >= bounds.lower[i] and asked <= bounds.upper[i]) or m.position_max[i] <= m.position_min[i]:
         return wp.uint64(0)
     code = active_limit(
         asked,
@@ -68,73 +69,22 @@ def limit_flag(m: Machine, start: Motion, i: int, asked: real, dt: real) -> wp.u
 
 
 @wp.func
-def limited_rate(m: Machine, start: Motion, i: int, asked: real, dt: real) -> real:
+def limited_rate(bounds: Bounds, i: int, asked: real) -> real:
     """Speed of actuator ``i`` nearest the one asked for that keeps its limits."""
-    bounds = bounds_of(m, start, i, dt)
-    return wp.min(wp.max(asked, bounds[0]), bounds[1])
+    return wp.min(wp.max(asked, bounds.lower[i]), bounds.upper[i])
 
 
 @wp.func
-def legs_may_follow(m: Machine, start: Motion, extensions: vec6, rates: vec6, dt: real) -> bool:
+def legs_may_follow(m: Machine, bounds: Bounds, extensions: vec6, rates: vec6, dt: real) -> bool:
     """Whether every leg can be at these extensions and rates after the step, and stop in time thereafter."""
     may = bool(True)
     for i in range(6):
-        bounds = bounds_of(m, start, i + 2, dt)
-        if rates[i] < bounds[0] or rates[i] > bounds[1]:
+        k = i + 2
+        if rates[i] < bounds.lower[k] or rates[i] > bounds.upper[k]:
             may = False
-        if not is_safe(
-            extensions[i], rates[i], m.position_min[i + 2], m.position_max[i + 2], m.acceleration[i + 2], dt
-        ):
+        if not is_safe(extensions[i], rates[i], m.position_min[k], m.position_max[k], m.acceleration[k], dt):
             may = False
     return may
-
-
-@wp.func
-def clearance(m: Machine, displacement: vec3, beta: vec3) -> real:
-    """det(J) of a pose over that of neutral: 0 in a singular pose, negative behind it."""
-    return determinant(leg_jacobian(m.geometry, displacement, beta)) / m.neutral_determinant
-
-
-@wp.func
-def is_clear(m: Machine, pose: vec6, extensions: vec6, beta: vec3, least: real) -> bool:
-    """Whether a pose has these legs, is a neighbour of the one with ``beta``, and not nearly singular.
-
-    Behind a singular pose Newton's iteration finds no pose, or one far off. Comparisons with NaN are false.
-    """
-    displacement = vec3(pose[0], pose[1], pose[2])
-    angles = vec3(pose[3], pose[4], pose[5])
-    error = wp.max(wp.abs(leg_extensions(m.geometry, displacement, angles) - extensions))
-    closes = error <= real(10.0) * NEWTON_TOLERANCE
-    near = wp.max(wp.abs(angles - beta)) <= NEIGHBOURHOOD
-    return closes and near and clearance(m, displacement, angles) >= least
-
-
-@wp.func
-def keeps_clear(
-    m: Machine, start: Motion, displacement: vec3, beta: vec3, extensions: vec6, rates: vec6
-) -> bool:
-    """Whether the platform, braking from here, comes to rest in a pose that is not nearly singular.
-
-    While each leg brakes, the extensions it comes to rest at stay the same, so what holds now holds until
-    rest. In a nearly singular pose any motion that ends clearer than it began is allowed.
-    """
-    now = clearance(m, displacement, beta)
-    if now >= FAR_FROM_SINGULAR:
-        return True
-    least = wp.min(NEARLY_SINGULAR, clearance(m, start.displacement, start.beta))
-    if now < least:
-        return False
-    halfway = extensions
-    resting = extensions
-    for i in range(6):
-        way = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
-        halfway[i] = extensions[i] + real(0.5) * way
-        resting[i] = extensions[i] + way
-    middle = forward_kinematics(m.geometry, halfway, displacement, beta)
-    rest = forward_kinematics(
-        m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
-    )
-    return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
 
 
 @wp.func
@@ -179,33 +129,35 @@ def pose_from_legs(m: Machine, motion: Motion, guess: Motion) -> Motion:
 
 
 @wp.func
-def legs_towards(m: Machine, start: Motion, target: Motion, rates: vec6, dt: real) -> Motion:
+def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
     """``target`` with each leg brought as near to its rate as its limits allow, and the pose that follows."""
     extensions = vec6()
     limited = vec6()
     for i in range(6):
-        limited[i] = limited_rate(m, start, i + 2, rates[i], dt)
+        limited[i] = limited_rate(bounds, i + 2, rates[i])
         extensions[i] = start.position[i + 2] + real(0.5) * dt * (start.rate[i + 2] + limited[i])
     return pose_from_legs(m, with_legs(target, extensions, limited), start)
 
 
 @wp.func
-def limited_legs(m: Machine, start: Motion, target: Motion, rates: vec6, dt: real) -> Motion:
+def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
     """Legs towards their asked rates, or braking to rest where that would lead into a singular pose."""
-    moved = legs_towards(m, start, target, rates, dt)
-    extensions = legs_of(moved.position)
-    if keeps_clear(m, start, moved.displacement, moved.beta, extensions, legs_of(moved.rate)):
+    moved = legs_towards(m, start, bounds, target, rates, dt)
+    s = moved.displacement
+    b = moved.beta
+    jacobian = leg_jacobian(m.geometry, s, b)
+    if keeps_clear(m, start, jacobian, s, b, legs_of(moved.position), legs_of(moved.rate)):
         return moved
-    return legs_towards(m, start, target, vec6(), dt)
+    return legs_towards(m, start, bounds, target, vec6(), dt)
 
 
 @wp.func
-def limit_axes(m: Machine, start: Motion, action: vec9, dt: real) -> Motion:
+def limit_axes(start: Motion, bounds: Bounds, action: vec9, dt: real) -> Motion:
     """Carriage and turntable after the step, each within its own limits; the hexapod as it was."""
     half = real(0.5) * dt
-    x = limited_rate(m, start, 0, start.rate[0] + action[0] * dt, dt)
-    y = limited_rate(m, start, 1, start.rate[1] + action[1] * dt, dt)
-    t = limited_rate(m, start, 8, start.rate[8] + action[8] * dt, dt)
+    x = limited_rate(bounds, 0, start.rate[0] + action[0] * dt)
+    y = limited_rate(bounds, 1, start.rate[1] + action[1] * dt)
+    t = limited_rate(bounds, 8, start.rate[8] + action[8] * dt)
     after = start
     after.rate = joined(x, y, legs_of(start.rate), t)
     after.position = joined(
@@ -228,19 +180,21 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
     displacement = start.displacement + (start.velocity + velocity) * half
     beta = start.beta + (start.beta_rate + beta_rate) * half
 
-    after = limit_axes(m, start, action, dt)
+    bounds = all_bounds(m, start, dt)
+    after = limit_axes(start, bounds, action, dt)
+    jacobian = leg_jacobian(m.geometry, displacement, beta)
     extensions = leg_extensions(m.geometry, displacement, beta)
-    rates = leg_rates(leg_jacobian(m.geometry, displacement, beta), velocity, beta, beta_rate)
-    clear = keeps_clear(m, start, displacement, beta, extensions, rates)
-    mask = command_limits(m, start, action, rates, clear, dt)
-    if legs_may_follow(m, start, extensions, rates, dt) and clear:
+    rates = leg_rates(jacobian, velocity, beta, beta_rate)
+    clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates)
+    mask = command_limits(m, start, bounds, action, rates, clear, dt)
+    if legs_may_follow(m, bounds, extensions, rates, dt) and clear:
         after = with_legs(after, extensions, rates)
         after.displacement = displacement
         after.velocity = velocity
         after.beta = beta
         after.beta_rate = beta_rate
     else:
-        after = limited_legs(m, start, after, rates, dt)
+        after = limited_legs(m, start, bounds, after, rates, dt)
 
     result = Step()
     result.motion = after
@@ -250,7 +204,7 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
 
 @wp.func
 def command_limits(
-    m: Machine, start: Motion, action: vec9, leg_rates_asked: vec6, clear: bool, dt: real
+    m: Machine, start: Motion, bounds: Bounds, action: vec9, leg_rates_asked: vec6, clear: bool, dt: real
 ) -> wp.uint64:
     """Which limits a command meets, as :class:`Step`'s mask."""
     mask = wp.uint64(0)
@@ -260,7 +214,7 @@ def command_limits(
             asked = leg_rates_asked[i - 2]
             if not clear:
                 mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
-        mask = mask | limit_flag(m, start, i, asked, dt)
+        mask = mask | limit_flag(m, start, bounds, i, asked, dt)
     return mask
 
 

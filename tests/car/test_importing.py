@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from motion_cueing.envs.car.import_options import ImportOptions
 from motion_cueing.envs.car.importing import ImportedLog, import_log
 from motion_cueing.envs.car.log_timing import low_pass

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from motion_cueing.envs.car import car_names, get_car, get_maneuver, maneuver_names
 from motion_cueing.envs.car.cone_maneuvers import DoubleLaneChange, ObstacleAvoidance, Slalom
 from motion_cueing.envs.car.corridors import Gate, clearance, smoothest_way

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
+
 from motion_cueing.envs.car import RandomDrives, drive_seeds, get_car, random_drive, random_drives
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import UnknownNameError
-from pydantic import ValidationError
 
 KINDS = ("urban", "rural", "highway")
 

@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from motion_cueing.envs.car import car_names, get_car
 from motion_cueing.envs.car.driver import Driver
 from motion_cueing.envs.car.paths import Path
@@ -11,7 +13,6 @@ from motion_cueing.envs.car.schedules import Change, Hold, Schedule
 from motion_cueing.envs.car.simulation import Plan, simulate, straight
 from motion_cueing.envs.car.vehicles import Car
 from motion_cueing.envs.cues import GRAVITY
-from scipy.spatial.transform import Rotation
 
 DT = 0.01
 DEG = np.pi / 180.0

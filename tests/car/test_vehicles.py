@@ -6,6 +6,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from motion_cueing.envs.car import Car, car_names, get_car
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
