@@ -57,7 +57,7 @@ bench: $(DEV) ## Measure speed; see docs/performance.md
 
 constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject.toml; UPGRADE=1 for newer versions
 	$(BIN)/python -m pip install -qq --disable-pip-version-check uv
-	$(BIN)/uv pip compile --quiet --universal --python-version 3.10 --extra dev --extra train --no-annotate \
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.10 --all-extras --no-annotate \
 		--custom-compile-command "make constraints" $(if $(UPGRADE),--upgrade) \
 		--output-file constraints.txt pyproject.toml
 

@@ -104,6 +104,9 @@ def test_no_import_goes_round_in_a_circle():
 @pytest.mark.parametrize("folder", sorted({path.parent.as_posix() for path in MODULES.values()}))
 def test_the_text_names_every_module(folder):
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    (row,) = (line for line in text.splitlines() if line.startswith(f"| `{folder}` |"))
+    rows = [line for line in text.splitlines() if line.startswith(f"| `{folder}` |")]
+    assert len(rows) == 1, f"the table of docs/architecture.md needs one row for {folder}"
+    named = set(re.findall(r"`([a-z_]+)`", rows[0].split("|", maxsplit=3)[3]))
     files = {path.stem for path in MODULES.values() if path.parent.as_posix() == folder} - {"__init__"}
-    assert set(re.findall(r"`([a-z_]+)`", row.split("|", maxsplit=3)[3])) == files
+    assert files - named == set(), f"the row of {folder} in docs/architecture.md does not name them"
+    assert named - files == set(), f"the row of {folder} in docs/architecture.md names what is gone"
