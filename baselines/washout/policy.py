@@ -102,6 +102,12 @@ class ClassicalWashout:
             [kernel_parameters(parameters, self.cab)], dtype=Parameters, device="cpu"
         )
         self._buffers: dict[int, _Buffers] = {}
+        # Compiled and loaded now, so that the first step of a drive takes no longer than the others.
+        self._make_buffers(1).launch.launch()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made anew: Warp's arrays cannot be."""
+        return type(self), (self.parameters, self.cab, self.dt)
 
     @property
     def start(self) -> Array:
