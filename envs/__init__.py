@@ -1,5 +1,8 @@
-"""The machine, the car and the driver's perception: everything that is not a policy."""
+"""The machine, the car, the driver's perception, and the environment: everything that is not a policy."""
 
 from .cues import GRAVITY, CueTrace
+from .registration import ENVIRONMENT_ID, register
 
-__all__ = ["GRAVITY", "CueTrace"]
+register()
+
+__all__ = ["ENVIRONMENT_ID", "GRAVITY", "CueTrace"]

@@ -29,6 +29,7 @@ class Row:
         scale: What one unit of the entry stands for, in ``unit``.
         unit: SI unit.
         meaning: For people.
+        bound: Greatest absolute value an environment's observation shows; what exceeds it is clipped.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Row:
     scale: float
     unit: str
     meaning: str
+    bound: float = 10.0
 
 
 ROWS: Final = (
@@ -49,9 +51,9 @@ ROWS: Final = (
     Row("velocity", 3, 1.0, "m/s", "their rates"),
     Row("beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw"),
     Row("beta_rate", 3, 1.0, "rad/s", "their rates"),
-    Row("turntable", 2, 1.0, "1", "sine and cosine of the turntable's angle"),
+    Row("turntable", 2, 1.0, "1", "sine and cosine of the turntable's angle", 1.0),
     Row("turntable_rate", 1, 1.0, "rad/s", "turntable rate"),
-    Row("legs", 6, 1.0, "1", "leg extensions over the limit they move towards"),
+    Row("legs", 6, 1.0, "1", "leg extensions over the limit they move towards", 1.0),
     Row("leg_rates", 6, 1.0, "1", "leg speeds over their limit"),
     Row("acceleration", 9, 10.0, "m/s^2, rad/s^2", "accelerations of the last step"),
 )
@@ -94,16 +96,9 @@ def share_of_limit(value: real, lower: real, upper: real) -> real:
     return -value / wp.min(lower, real(-1e-9))
 
 
-def observe_kernel(
-    machines: wp.array(dtype=Machine),
-    machine_of: wp.array(dtype=int),
-    state: wp.array(dtype=State),
-    out: wp.array2d(dtype=real),
-) -> None:
-    """Observation of every environment; the rows in the order of :data:`ROWS`."""
-    i = wp.tid()
-    m = machines[machine_of[i]]
-    s = state[i]
+@wp.func
+def write_observation(m: Machine, s: State, out: wp.array2d(dtype=real), i: int) -> int:
+    """One environment's observation, the rows in the order of :data:`ROWS`; returns its size."""
     p = s.setpoint
     gravity = real(wp.static(GRAVITY))
     one = real(1.0)
@@ -129,7 +124,18 @@ def observe_kernel(
         j = leg + 2
         out[i, k + leg] = share_of_limit(p.position[j], m.position_min[j], m.position_max[j])
         out[i, k + 6 + leg] = p.rate[j] / m.velocity[j]
-    put(out, i, k + 12, s.acceleration, 9, real(wp.static(SCALES["acceleration"])))
+    return put(out, i, k + 12, s.acceleration, 9, real(wp.static(SCALES["acceleration"])))
+
+
+def observe_kernel(
+    machines: wp.array(dtype=Machine),
+    machine_of: wp.array(dtype=int),
+    state: wp.array(dtype=State),
+    out: wp.array2d(dtype=real),
+) -> None:
+    """Observation of every environment."""
+    i = wp.tid()
+    write_observation(machines[machine_of[i]], state[i], out, i)
 
 
 observe_forward = wp.kernel(observe_kernel, enable_backward=False, module="unique")

@@ -94,7 +94,7 @@ class Simulator:
         self._delays = [wp.zeros((n, depth), dtype=SetPoint, device=device) for _ in range(2)]
         self.action_array = wp.zeros(n, dtype=vec9, device=device)
         self._now = 0
-        self._steps = [self._record(0), self._record(1)]
+        self._steps: list[Any] = []
         on_host = device.is_cpu
         self._views = [state.numpy() for state in self._states] if on_host else None
         self._action_view = self.action_array.numpy() if on_host else None
@@ -126,6 +126,16 @@ class Simulator:
             self._placing["drive_of"].array,
             real(self.dt),
         ]
+
+    @property
+    def copies(self) -> list[tuple[Any, Any]]:
+        """The two pairs of Warp arrays, state and earlier set-points, that hold in turn."""
+        return list(zip(self._states, self._delays, strict=True))
+
+    @property
+    def current(self) -> int:
+        """Which of :attr:`copies` holds now."""
+        return self._now
 
     @property
     def delay_array(self) -> Any:
@@ -249,7 +259,13 @@ class Simulator:
 
     def advance(self) -> None:
         """Advance by one step with the accelerations in :attr:`action_array`, unchecked."""
+        if not self._steps:
+            self._steps = [self._record(0), self._record(1)]
         self._steps[self._now].launch()
+        self.swap()
+
+    def swap(self) -> None:
+        """The other copies of state and set-points hold now: a launch has written them."""
         self._now = 1 - self._now
 
 

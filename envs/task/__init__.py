@@ -1,0 +1,25 @@
+"""The reinforcement-learning task: options, the single and the vector environment."""
+
+from .environment import DrivingSimulator
+from .options import (
+    ActionOptions,
+    EpisodeOptions,
+    ObservationOptions,
+    RandomisationOptions,
+    RewardOptions,
+    RewardWeights,
+    TaskOptions,
+)
+from .vector import DrivingSimulatorVector
+
+__all__ = [
+    "ActionOptions",
+    "DrivingSimulator",
+    "DrivingSimulatorVector",
+    "EpisodeOptions",
+    "ObservationOptions",
+    "RandomisationOptions",
+    "RewardOptions",
+    "RewardWeights",
+    "TaskOptions",
+]

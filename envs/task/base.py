@@ -1,0 +1,111 @@
+"""A base policy under the agent: it acts, and the agent corrects it or turns its knobs.
+
+Any policy that follows Stable-Baselines3's convention can be one; this package does not know which there are.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConfigurationError
+from ..platform.state import AXES
+from .options import Mode
+
+Array = NDArray[Any]
+
+
+@runtime_checkable
+class BasePolicy(Protocol):
+    """What the mode "residual" needs.
+
+    Its state must be None or an array with one row an environment.
+    """
+
+    def predict(
+        self,
+        observation: Array,
+        state: Any = None,
+        episode_start: Array | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, Any]:
+        """Accelerations (n, 9), m/s^2 and rad/s^2, for observations (n, OBSERVATION_SIZE), and its state."""
+        ...
+
+
+@runtime_checkable
+class ScheduledPolicy(Protocol):
+    """What the mode "gains" needs: a policy whose parameters are set anew at every step."""
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """What each entry of an action sets."""
+        ...
+
+    def schedule(
+        self, observation: Array, gains: Array, state: Any = None, episode_start: Array | None = None
+    ) -> tuple[Array, Any]:
+        """Accelerations (n, 9) with gains (n, k) in [-1, 1], 0 for the policy as it is, and its state."""
+        ...
+
+
+class Base:
+    """The base policy of a batch, with its memory.
+
+    Args:
+        policy: The policy, or None.
+        mode: What actions mean.
+        n: Environments.
+
+    Raises:
+        ConfigurationError: the mode needs another policy than there is.
+    """
+
+    def __init__(self, policy: Any, mode: Mode, n: int) -> None:
+        _check(policy, mode)
+        self.policy = policy
+        self.residual, self.scheduled = mode == "residual", mode == "gains"
+        self.action_size = len(policy.gain_names) if self.scheduled else len(AXES)
+        self._begins = np.ones(n, dtype=bool)
+        self._state: Any = None
+
+    def begin(self, mask: NDArray[np.bool_]) -> None:
+        """Episodes begin in the masked environments."""
+        self._begins |= mask
+
+    def ask(
+        self, observation: Array, out: Array, gains: Array | None, mask: NDArray[np.bool_] | None
+    ) -> None:
+        """Write what the policy does at observations (n, OBSERVATION_SIZE) into ``out`` (n, 9).
+
+        Args:
+            observation: The fixed rows.
+            out: Accelerations, m/s^2 and rad/s^2.
+            gains: (n, k) for a scheduled policy.
+            mask: (n,) the environments asked for, the others stay as they are; default: all.
+        """
+        begins = self._begins.copy()
+        if self.scheduled:
+            action, state = self.policy.schedule(observation, gains, self._state, begins)
+        else:
+            action, state = self.policy.predict(observation, self._state, begins, deterministic=True)
+        action = np.reshape(action, out.shape)
+        if mask is None or self._state is None or state is None:
+            out[...], self._state = action, state
+            self._begins[...] = False
+            return
+        out[mask] = action[mask]
+        self._state = np.array(self._state)
+        self._state[mask] = np.asarray(state)[mask]
+        self._begins &= ~mask
+
+
+def _check(policy: Any, mode: Mode) -> None:
+    if mode == "residual" and not isinstance(policy, BasePolicy):
+        raise ConfigurationError("action.mode 'residual' needs base=, a policy with predict(...)")
+    if mode == "gains" and not isinstance(policy, ScheduledPolicy):
+        raise ConfigurationError("action.mode 'gains' needs base=, a policy with schedule(...)")
+    if policy is not None and mode not in ("residual", "gains"):
+        raise ConfigurationError(f"base= is of no use with action.mode {mode!r}; leave it out")

@@ -1,0 +1,176 @@
+"""A batch of environments without an interface: what the single, the vector and other environments share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..cues import CueTrace
+from ..errors import ActionError, ConfigurationError, UnknownNameError
+from ..perception.models import get_vestibular_model
+from ..simulator import TIME_STEP, Simulator
+from . import draws
+from .base import Base
+from .episode import DRIVE, MACHINE, draw, fill_episodes, start_poses, start_samples
+from .launches import ALL, CORE, FRAME, NOTHING, BatchArrays, Launches, rules_of
+from .layout import layout_of
+from .library import library_of, machines_of
+from .options import TaskOptions
+from .scaling import acceleration_scale
+
+Mask = NDArray[np.bool_]
+
+
+class Batch:
+    """Environments stepped together; rewards, ends and observations lie in ``arrays``, new after each step.
+
+    Args:
+        n: Environments.
+        options: Everything that can be chosen.
+        drives: Cue traces to drive instead of those of ``options.episode``.
+        base: The base policy, where ``options.action.mode`` needs one.
+        device: "cpu" or a CUDA device of Warp.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        options: TaskOptions,
+        *,
+        drives: Sequence[CueTrace] | None = None,
+        base: Any = None,
+        device: str = "cpu",
+    ) -> None:
+        if n < 1:
+            raise ConfigurationError(f"a batch needs at least one environment, found {n}")
+        self.n, self.options = n, options
+        self.drives = self._library(drives)
+        self.simulator = Simulator(
+            machines_of(options),
+            self.drives,
+            drive_of=np.zeros(n, dtype=np.int32),
+            vestibular=get_vestibular_model(options.vestibular),
+            device=device,
+        )
+        self.platform = self.simulator.platforms[0]
+        self.base = Base(base, options.action.mode, n)
+        self.action_size = self.base.action_size
+        self.layout = layout_of(options.observation, options.action.mode, self.action_size)
+        self.arrays = BatchArrays(n, self.action_size, self.layout, self.simulator.device)
+        self.scale = acceleration_scale(self.platform) * options.action.authority
+        self.time_step = TIME_STEP * options.action.repeat
+        self._lengths = np.array([len(drive) for drive in self.drives])
+        self._keys, self._episodes = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.int64)
+        rules = rules_of(options, self.layout, self.platform, TIME_STEP)
+        self._launches = Launches(self.simulator, self.arrays, rules)
+
+    def _library(self, drives: Sequence[CueTrace] | None) -> list[CueTrace]:
+        if drives is None:
+            drives = library_of(self.options.episode, self.options.randomisation)
+        return [drive.resampled(TIME_STEP) for drive in drives]
+
+    def seed(self, mask: Mask, seeds: Sequence[int]) -> None:
+        """Give the masked environments seeds (one for each environment of the batch), and start over."""
+        chosen = np.flatnonzero(mask)
+        self._keys[chosen] = [draws.key_of(seeds[i]) for i in chosen.tolist()]
+        self._episodes[chosen] = 0
+
+    def begin(self, mask: Mask, drive: ArrayLike | None = None) -> None:
+        """Begin the next episode in the masked environments, in a drawn drive or in the one given (n,)."""
+        words = draw(self._keys[mask], self._episodes[mask])
+        self._episodes[mask] += 1
+        drive_of = self._chosen(words[:, DRIVE], len(self.drives))
+        if drive is not None:
+            drive_of = np.broadcast_to(np.asarray(drive, dtype=np.int32), (self.n,))[mask]
+        options = self.options
+        first, last = start_samples(words, self._lengths[drive_of], options.episode, TIME_STEP)
+        fill_episodes(self.arrays.episode.view, mask, words, last, options.randomisation)
+        self.arrays.episode.push()
+        self._place(
+            mask,
+            drive_of=drive_of,
+            machine_of=self._chosen(words[:, MACHINE], len(self.simulator.platforms)),
+            sample=first,
+            start=start_poses(words, self.platform, options.episode.platform_offset),
+        )
+
+    def _place(self, mask: Mask, **drawn: NDArray[Any]) -> None:
+        """Put the masked environments where was drawn for them."""
+        where = {name: np.zeros((self.n, *values.shape[1:]), values.dtype) for name, values in drawn.items()}
+        for name, values in drawn.items():
+            where[name][mask] = values
+        self.simulator.place(mask, **where)
+        self._mark(mask)
+        self.base.begin(mask)
+        self._launches.forget()
+
+    def _mark(self, begins: Mask) -> None:
+        self.arrays.begins.view[...] = begins
+        self.arrays.begins.push()
+
+    @staticmethod
+    def _chosen(words: NDArray[np.uint64], count: int) -> NDArray[np.int32]:
+        return np.floor(draws.uniform(words) * count).astype(np.int32)
+
+    def step(self) -> None:
+        """Advance by one action, which lies in ``arrays.action``; rewards, ends and observations are new."""
+        arrays, repeat = self.arrays, self.options.action.repeat
+        arrays.action.push()
+        if self.base.scheduled:
+            self._ask(np.clip(arrays.action.view, -1.0, 1.0))
+        for k in range(repeat):
+            parts = NOTHING if k < repeat - 1 else CORE if self.base.residual else ALL
+            self._launches.play(k == 0, parts)
+        if self.base.residual:
+            self._ask()
+            self._launches.look(False, FRAME)
+
+    def observe(self, begins: Mask) -> None:
+        """Make the observations of the environments new whose episode ``begins`` (n,)."""
+        self._mark(begins)
+        self._launches.look(True, CORE)
+        if self.base.residual:
+            self._ask(mask=begins)
+        self._launches.look(True, FRAME)
+        self._mark(np.zeros(self.n, dtype=bool))
+
+    def _ask(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
+        """Let the base policy act."""
+        self.base.ask(self.arrays.core.pull(), self.arrays.base.view, gains, mask)
+        self.arrays.base.push()
+
+    @property
+    def clipped(self) -> NDArray[np.int32]:
+        """(n,) entries of the last action outside [-1, 1]."""
+        return np.asarray(self.arrays.command.pull()["clipped"])
+
+    def write(self, action: ArrayLike) -> None:
+        """Put actions (n, action_size) into ``arrays.action``.
+
+        Raises:
+            ActionError: a wrong shape, or a value that is not finite; nothing has moved then.
+        """
+        values = np.asarray(action, dtype=np.float32)
+        if values.shape != self.arrays.action.view.shape:
+            raise ActionError(f"action has shape {values.shape}, expected {self.arrays.action.view.shape}")
+        if not np.isfinite(values).all():
+            raise ActionError(f"action is not finite: {values[~np.isfinite(values)][:3]} among its entries")
+        self.arrays.action.view[...] = values
+
+    def drive_indices(self, names: str | int | Sequence[str | int]) -> NDArray[np.int32]:
+        """Indices into :attr:`drives`, of drives by index or name.
+
+        Raises:
+            UnknownNameError: no drive of the library has this name.
+        """
+        known = [drive.name for drive in self.drives]
+        chosen = []
+        for name in [names] if isinstance(names, str | int) else names:
+            label = known[name] if isinstance(name, int | np.integer) and 0 <= name < len(known) else name
+            if label not in known:
+                raise UnknownNameError("drive", str(name), known)
+            chosen.append(int(name) if isinstance(name, int | np.integer) else known.index(label))
+        return np.array(chosen, dtype=np.int32)

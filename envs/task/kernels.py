@@ -1,0 +1,183 @@
+"""The kernels of a batch: play a step, begin an episode, look. Everything is one launch, for all rows.
+
+action -> accelerations -> **machine, cues, perception** -> reward -> observation
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ..observation import write_observation
+from ..perception.filters import Vestibular
+from ..platform.state import Machine, SetPoint
+from ..precision import real, vec9
+from ..state import Drives, State
+from ..step import next_state, shift_delay
+from .act_kernel import ActionScale, asked_accelerations, take_action
+from .episode import Episode
+from .observe_kernel import Places, repeat_frame, shift_frames, write_frame
+from .reward_kernel import RewardScale, action_change, has_failed, terms_now, vec_terms
+
+CORE = wp.constant(1)
+FRAME = wp.constant(2)
+"""Parts of an observation: the fixed rows in full precision, and the frame in float32."""
+
+
+@wp.struct
+class Rules:
+    """What is the same for the whole batch."""
+
+    action: ActionScale
+    reward: RewardScale
+    places: Places
+    share: real  # of a time step in an action
+    dt: real  # time step, s
+
+
+@wp.struct
+class Command:
+    """What an environment's actions have asked for."""
+
+    acceleration: vec9
+    clipped: int  # entries of the action outside [-1, 1]
+
+
+@wp.struct
+class Arrays:
+    """What a batch holds a row of for each environment, beside the simulator's state."""
+
+    episode: wp.array(dtype=Episode)
+    begins: wp.array(dtype=wp.bool)
+    action: wp.array2d(dtype=wp.float32)
+    now: wp.array2d(dtype=wp.float32)  # the clipped action
+    before: wp.array2d(dtype=wp.float32)  # the one before
+    base: wp.array(dtype=vec9)
+    command: wp.array(dtype=Command)
+    terms: wp.array(dtype=vec_terms)
+    reward: wp.array(dtype=real)
+    terminated: wp.array(dtype=wp.bool)
+    truncated: wp.array(dtype=wp.bool)
+    core: wp.array2d(dtype=real)
+    bounds: wp.array(dtype=wp.float32)  # of an observation's entries
+    observation: wp.array2d(dtype=wp.float32)
+
+
+@wp.func
+def commanded(rules: Rules, a: Arrays, s: State, i: int, first: int) -> vec9:
+    """Accelerations of a time step, the first of an action or a later one."""
+    c = a.command[i]
+    if first != 0:
+        c.clipped = take_action(a.action, a.now, a.before, i)
+    c.acceleration = asked_accelerations(rules.action, s, a.now, i, a.base[i], c.acceleration, rules.dt)
+    a.command[i] = c
+    return wp.cw_mul(c.acceleration, a.episode[i].actuator_gain)
+
+
+@wp.func
+def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> int:
+    """Terms, reward and ends after a time step; terms are means over the time steps of an action."""
+    terms = terms_now(rules.reward, m, s, rules.share)
+    ended = bool(False)
+    if first != 0:
+        terms[6] = action_change(a.now, a.before, i)
+    else:
+        terms = terms + a.terms[i]
+        ended = a.terminated[i]
+    if rules.reward.terminate != 0 and not ended and has_failed(s.limits):
+        terms[7] = real(1.0)
+        ended = bool(True)
+    a.terms[i] = terms
+    a.reward[i] = -wp.dot(rules.reward.weights, terms)
+    a.terminated[i] = ended
+    a.truncated[i] = s.sample >= a.episode[i].last
+    return 0
+
+
+@wp.func
+def look_at(
+    rules: Rules, a: Arrays, drives: Drives, drive: int, m: Machine, s: State, i: int, parts: int
+) -> int:
+    """Write the observation of an environment, or parts of it."""
+    if parts & CORE:
+        write_observation(m, s, a.core, i)
+    if parts & FRAME:
+        command = a.command[i]
+        shift_frames(a.observation, i, rules.places.frame)
+        write_frame(
+            rules.places,
+            drives,
+            drive,
+            a.episode[i],
+            s,
+            a.core,
+            a.now,
+            command.acceleration,
+            a.base[i],
+            a.bounds,
+            a.observation,
+            i,
+        )
+    return 0
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def play(
+    rules: Rules,
+    a: Arrays,
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    first: int,
+    parts: int,
+    state: wp.array(dtype=State),
+    delay: wp.array2d(dtype=SetPoint),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+) -> None:
+    """One time step: ``first`` says whether an action begins, ``parts`` what of the observation is made."""
+    i = wp.tid()
+    m = machines[machine_of[i]]
+    s = state[i]
+    acceleration = commanded(rules, a, s, i, first)
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, acceleration, rules.dt)
+    if m.has_dynamics != 0:
+        shift_delay(delay, delay_out, i, after.setpoint)
+    state_out[i] = after
+    judge(rules, a, m, after, i, first)
+    look_at(rules, a, drives, drive_of[i], m, after, i, parts)
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def look(
+    rules: Rules,
+    a: Arrays,
+    machines: wp.array(dtype=Machine),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    only_begins: int,
+    parts: int,
+    state: wp.array(dtype=State),
+) -> None:
+    """Observations outside of a step; frames begin anew where an episode ``begins``."""
+    i = wp.tid()
+    begins = a.begins[i]
+    if only_begins != 0 and not begins:
+        return
+    look_at(rules, a, drives, drive_of[i], machines[machine_of[i]], state[i], i, parts)
+    if begins and parts & FRAME:
+        repeat_frame(a.observation, i, rules.places.frame)
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def forget(a: Arrays) -> None:
+    """Nothing has been asked for where an episode begins."""
+    i = wp.tid()
+    if not a.begins[i]:
+        return
+    for k in range(a.now.shape[1]):
+        a.now[i, k] = wp.float32(0.0)
+        a.before[i, k] = wp.float32(0.0)
+    a.command[i] = Command()

@@ -1,0 +1,145 @@
+"""The recorded launches of a batch: each kernel with its arrays, once for each copy of the state."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from ..mirror import Mirror
+from ..observation import OBSERVATION_SIZE
+from ..platform.machines import Platform
+from ..precision import real, vec9
+from ..simulator import Simulator
+from .act_kernel import MODES, ActionScale
+from .episode import Episode
+from .kernels import Arrays, Command, Rules, forget, look, play
+from .layout import Layout
+from .observe_kernel import places_of
+from .options import ActionOptions, TaskOptions
+from .reward_kernel import reward_scale, vec_terms
+from .scaling import acceleration_scale, free_axes, velocity_scale
+
+NOTHING, CORE, FRAME, ALL = range(4)
+"""Parts of an observation, as the kernels number them."""
+
+_KINDS: Final[dict[str, Any]] = {
+    "episode": Episode,
+    "begins": wp.bool,
+    "base": vec9,
+    "command": Command,
+    "terms": vec_terms,
+    "reward": real,
+    "terminated": wp.bool,
+    "truncated": wp.bool,
+}
+
+
+class BatchArrays:
+    """The arrays of a batch, as attributes named like the fields of :class:`~.kernels.Arrays`.
+
+    Args:
+        n: Environments.
+        action_size: Entries of an action.
+        layout: Of the observations.
+        device: Where kernels work on them.
+    """
+
+    episode: Mirror
+    begins: Mirror
+    base: Mirror
+    command: Mirror
+    terms: Mirror
+    reward: Mirror
+    terminated: Mirror
+    truncated: Mirror
+
+    def __init__(self, n: int, action_size: int, layout: Layout, device: Any) -> None:
+        for name, kind in _KINDS.items():
+            setattr(self, name, Mirror(n, kind, device))
+        self.action = Mirror((n, action_size), wp.float32, device)
+        self.now = Mirror((n, action_size), wp.float32, device)
+        self.before = Mirror((n, action_size), wp.float32, device)
+        self.core = Mirror((n, OBSERVATION_SIZE), real, device)
+        self.observation = Mirror((n, layout.size), wp.float32, device)
+        self.bounds = Mirror(layout.size, wp.float32, device)
+        self.bounds.view[...] = layout.bounds
+        self.bounds.push()
+
+    def for_kernels(self) -> Any:
+        """The kernels' form."""
+        arrays: Any = Arrays()
+        for name, mirror in vars(self).items():
+            setattr(arrays, name, mirror.array)
+        return arrays
+
+
+def action_scale(platform: Platform, options: ActionOptions) -> Any:
+    """The kernel's form of what an action of 1 stands for."""
+    scale: Any = ActionScale()
+    largest: NDArray[np.float64] = acceleration_scale(platform) * options.authority
+    scale.mode = MODES[options.mode]
+    scale.acceleration, scale.jerk = vec9(*largest), vec9(*largest / options.rise_time)
+    scale.velocity, scale.free = vec9(*velocity_scale(platform)), vec9(*free_axes(options.frozen))
+    return scale
+
+
+def rules_of(options: TaskOptions, layout: Layout, platform: Platform, dt: float) -> Any:
+    """What is the same for a whole batch, as the kernels read it."""
+    rules: Any = Rules()
+    seen = options.observation
+    stride = max(1, round(seen.preview_spacing / dt))
+    rules.action = action_scale(platform, options.action)
+    rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
+    rules.places = places_of(layout, seen.preview, stride, options.randomisation)
+    rules.share, rules.dt = 1.0 / options.action.repeat, dt
+    return rules
+
+
+class Launches:
+    """What a batch launches.
+
+    Args:
+        simulator: The machines, whose state each step replaces.
+        arrays: Of the batch.
+        rules: From :func:`rules_of`.
+    """
+
+    def __init__(self, simulator: Simulator, arrays: BatchArrays, rules: Any) -> None:
+        self._simulator = simulator
+        self._common = [rules, arrays.for_kernels()]
+        self._recorded: dict[tuple[Any, ...], Any] = {}
+
+    def play(self, first: bool, parts: int) -> None:
+        """A time step, the ``first`` of an action or a later one, and ``parts`` of the observations."""
+        simulator = self._simulator
+        key = ("play", first, parts, simulator.current)
+        if key not in self._recorded:
+            begin, end = simulator.copies[simulator.current], simulator.copies[1 - simulator.current]
+            *constants, _ = simulator.constants
+            self._record(key, play, [*self._common, *constants, int(first), parts, *begin, *end])
+        self._recorded[key].launch()
+        simulator.swap()
+
+    def look(self, only_begins: bool, parts: int) -> None:
+        """``parts`` of the observations, outside of a step."""
+        simulator = self._simulator
+        key = ("look", only_begins, parts, simulator.current)
+        if key not in self._recorded:
+            machines, _, drives, machine_of, drive_of, _ = simulator.constants
+            state, _ = simulator.copies[simulator.current]
+            arrays = [machines, drives, machine_of, drive_of]
+            self._record(key, look, [*self._common, *arrays, int(only_begins), parts, state])
+        self._recorded[key].launch()
+
+    def forget(self) -> None:
+        """Forget the actions where episodes begin."""
+        if ("forget",) not in self._recorded:
+            self._record(("forget",), forget, [self._common[1]])
+        self._recorded[("forget",)].launch()
+
+    def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> None:
+        n, device = self._simulator.n, self._simulator.device
+        self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)

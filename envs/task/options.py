@@ -1,0 +1,216 @@
+"""Everything that can be chosen about the environment, as frozen dataclasses that load from YAML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from ..car import RandomDrives, maneuver_names, recording_names
+from ..cue_cost import CueCost
+from ..errors import UnknownNameError
+from ..perception.models import vestibular_model_names
+from ..platform.machines import Platform
+from ..platform.presets import platform_names
+from ..platform.state import AXES
+from ..settings import STRICT, NonNegative, Positive, Vector2, Vector3
+
+Count = Annotated[int, Field(ge=0)]
+PositiveCount = Annotated[int, Field(ge=1)]
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
+
+
+def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
+    known = list(known)
+    for name in names:
+        if name not in known:
+            raise ValueError(str(UnknownNameError(kind, name, known)))
+
+
+def _check_range(name: str, limits: Vector2) -> None:
+    if limits[0] > limits[1]:
+        raise ValueError(f"{name} must be a range from low to high, found {list(limits)}")
+
+
+@dataclass(frozen=True, config=STRICT)
+class ObservationOptions:
+    """What the observation holds beside its fixed rows.
+
+    Args:
+        preview: Samples of the car's cues ahead.
+        preview_spacing: Time between them, s; rounded to whole time steps.
+        perceived: Whether the signals the driver senses, in the car and in the simulator, are added.
+        true_motion: Whether the machine's true motion is added; it differs from the set-points where
+            actuators lag.
+        stack: Observations in one, the newest first; 1 for no stacking.
+    """
+
+    preview: Count = 0
+    preview_spacing: Positive = 0.2
+    perceived: bool = False
+    true_motion: bool = False
+    stack: PositiveCount = 1
+
+
+@dataclass(frozen=True, config=STRICT)
+class ActionOptions:
+    """What an action means; always a number in [-1, 1] for each entry.
+
+    Args:
+        mode: "acceleration": of the nine axes. "jerk": their rate of change. "velocity": the speed to
+            reach, as fast as ``authority`` lets. "residual": an acceleration added to that of the base
+            policy. "gains": the parameters of the base policy.
+        authority: Largest acceleration, as a share of what the machine can do on the axis alone.
+        rise_time: Time in which full jerk takes an acceleration from zero to its largest value, s.
+        frozen: Axes that do not move, by name.
+        repeat: Time steps for which an action is held; rewards are averaged over them.
+    """
+
+    mode: Mode = "acceleration"
+    authority: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    rise_time: Positive = 0.2
+    frozen: tuple[str, ...] = ()
+    repeat: PositiveCount = 1
+
+    def __post_init__(self) -> None:
+        _check_names("axis", self.frozen, AXES)
+
+
+@dataclass(frozen=True, config=STRICT)
+class RewardWeights:
+    """Weight of each term of the reward, which is minus their weighted sum; 0 switches a term off.
+
+    Args:
+        cue_error: Error of the cues at the cab, whose mean over a drive is J.
+        perceived_error: The same of what the driver senses.
+        false_cues: The part of ``cue_error`` on axes that move where the car does not, or against it.
+        tilt_rate: Square of the roll and pitch rate beyond the car's own, above the threshold, in thresholds.
+        stroke: Square of the use of travel beyond a margin, summed over actuators; 1 at an end of travel.
+        limits: Share of the actuators held back by a limit.
+        action_rate: Mean square change of the action.
+        failure: 1 where the episode is terminated.
+    """
+
+    cue_error: NonNegative = 1.0
+    perceived_error: NonNegative = 0.0
+    false_cues: NonNegative = 0.0
+    tilt_rate: NonNegative = 0.02
+    stroke: NonNegative = 0.1
+    limits: NonNegative = 0.1
+    action_rate: NonNegative = 0.02
+    failure: NonNegative = 100.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class RewardOptions:
+    """The reward's weights, scales and thresholds.
+
+    Args:
+        weights: Of its terms.
+        zone: Indifference zone of the cue errors.
+        force_threshold: Perception of specific force x, y, z, m/s^2 (Reid and Nahon, from memory).
+        rate_threshold: Perception of angular velocity x, y, z, rad/s (Zacharias; 3.0, 3.6, 2.6 deg/s).
+        tilt_rate: Tilt rate that goes unnoticed, rad/s (3 deg/s, SIMONA).
+        stroke_margin: Share of the travel that costs nothing.
+    """
+
+    weights: RewardWeights = RewardWeights()
+    zone: CueCost = CueCost()
+    force_threshold: Vector3 = (0.17, 0.17, 0.28)
+    rate_threshold: Vector3 = (math.radians(3.0), math.radians(3.6), math.radians(2.6))
+    tilt_rate: Positive = math.radians(3.0)
+    stroke_margin: Share = 0.8
+
+
+@dataclass(frozen=True, config=STRICT)
+class EpisodeOptions:
+    """What is driven, from where to where.
+
+    Args:
+        drives: Maneuvers and recordings by name, one drawn for each episode; none for random drives.
+        random: The random drives, and the cars that drive them and the maneuvers.
+        library: Random drives to draw from. They are made when the environment is.
+        library_seed: Of the random drives, and of the machines and cars of the randomisation.
+        drive_duration: Of a random drive, s.
+        duration: Longest episode, s; None for the whole drive.
+        random_start: Whether an episode begins anywhere in its drive that leaves ``duration`` to go.
+        platform_offset: The machine begins anywhere within this share of its travel.
+        terminate_on_failure: Whether an end of travel or a nearly singular pose ends an episode.
+    """
+
+    drives: tuple[str, ...] = ()
+    random: RandomDrives = RandomDrives()
+    library: PositiveCount = 16
+    library_seed: Count = 0
+    drive_duration: Positive = 60.0
+    duration: Positive | None = None
+    random_start: bool = False
+    platform_offset: Share = 0.0
+    terminate_on_failure: bool = False
+
+    def __post_init__(self) -> None:
+        _check_names("drive", self.drives, [*maneuver_names(), *recording_names()])
+        if self.random_start and self.duration is None:
+            raise ValueError("random_start needs a duration, shorter than the drives")
+
+
+@dataclass(frozen=True, config=STRICT)
+class RandomisationOptions:
+    """What differs from episode to episode; nothing by default. Cars are ``episode.random.cars``.
+
+    Args:
+        friction: Range of a factor on the tires' friction, drawn for each drive of the library.
+        natural_frequency: Range of the actuators' lag, rad/s; None leaves the platform's own.
+        dead_time: Range of the actuators' dead time, s; None leaves the platform's own.
+        machines: Machines to draw from, if lag or dead time are drawn.
+        actuator_gain: Largest relative error of the acceleration of each axis.
+        sensor_gain: Largest relative error of the cab's accelerometers and gyroscopes.
+        force_noise: Standard deviation of the noise of the cab's accelerometers, m/s^2.
+        rate_noise: Standard deviation of the noise of its gyroscopes, rad/s.
+    """
+
+    friction: tuple[Positive, Positive] = (1.0, 1.0)
+    natural_frequency: tuple[Positive, Positive] | None = None
+    dead_time: tuple[NonNegative, NonNegative] | None = None
+    machines: PositiveCount = 16
+    actuator_gain: Share = 0.0
+    sensor_gain: Share = 0.0
+    force_noise: NonNegative = 0.0
+    rate_noise: NonNegative = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "natural_frequency", "dead_time"):
+            if getattr(self, name) is not None:
+                _check_range(name, getattr(self, name))
+
+
+@dataclass(frozen=True, config=STRICT)
+class TaskOptions:
+    """The whole environment.
+
+    Args:
+        platform: The machine, or its name.
+        vestibular: Perception model by name.
+        observation: What is seen.
+        action: What can be done.
+        reward: What is good.
+        episode: What is driven.
+        randomisation: What differs from episode to episode.
+    """
+
+    platform: Platform | str = "paper"
+    vestibular: str = "zacharias"
+    observation: ObservationOptions = ObservationOptions()
+    action: ActionOptions = ActionOptions()
+    reward: RewardOptions = RewardOptions()
+    episode: EpisodeOptions = EpisodeOptions()
+    randomisation: RandomisationOptions = RandomisationOptions()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.platform, str):
+            _check_names("platform", [self.platform], platform_names())
+        _check_names("vestibular model", [self.vestibular], vestibular_model_names())

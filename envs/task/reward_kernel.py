@@ -1,0 +1,154 @@
+"""The reward: minus the weighted sum of named terms, for a whole batch."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import warp as wp
+
+from ..cue_cost import Zone, cue_error, perceived_error, zone
+from ..cues import GRAVITY
+from ..platform.parameters import UNLIMITED
+from ..platform.state import Machine
+from ..precision import real, vec3
+from ..state import State
+from .options import RewardOptions
+
+TERMS: Final = (
+    "cue_error",
+    "perceived_error",
+    "false_cues",
+    "tilt_rate",
+    "stroke",
+    "limits",
+    "action_rate",
+    "failure",
+)
+"""Names of the terms, in the kernel's order; fields of :class:`~.options.RewardWeights`."""
+
+N_TERMS: Final = len(TERMS)
+vec_terms: Any = wp.types.vector(N_TERMS, real)
+
+END_OF_TRAVEL: Final = 0x111111111
+"""Bits of a step's limits that say an end of travel, one for each actuator."""
+
+SINGULAR: Final = 0x888888888
+"""Bits that say a nearly singular pose."""
+
+
+@wp.struct
+class RewardScale:
+    """The kernel's form of :class:`~.options.RewardOptions`."""
+
+    weights: vec_terms
+    zone: Zone
+    force_threshold: vec3
+    rate_threshold: vec3
+    tilt_rate: real
+    stroke_margin: real
+    terminate: int  # whether failure ends an episode
+
+
+def reward_scale(options: RewardOptions, terminate: bool) -> Any:
+    """The kernel's form of the options."""
+    scale: Any = RewardScale()
+    scale.weights = vec_terms(*(getattr(options.weights, name) for name in TERMS))
+    scale.zone = zone(options.zone)
+    scale.force_threshold = vec3(*options.force_threshold)
+    scale.rate_threshold = vec3(*options.rate_threshold)
+    scale.tilt_rate, scale.stroke_margin = options.tilt_rate, options.stroke_margin
+    scale.terminate = int(terminate)
+    return scale
+
+
+@wp.func
+def false_cue(wanted: real, felt: real, threshold: real, scale: real) -> real:
+    """Squared error over ``scale`` where the cab moves noticeably and the car does not, or against it."""
+    error = felt - wanted
+    against = wp.abs(wanted) <= threshold or wanted * felt < real(0.0)
+    if against and wp.abs(felt) > threshold and wp.abs(error) > threshold:
+        return error * error / (scale * scale)
+    return real(0.0)
+
+
+@wp.func
+def false_cues(r: RewardScale, s: State) -> real:
+    """False cues of all six axes, at the cab's reference point; forces relative to rest."""
+    gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
+    wanted = s.wanted.force + gravity
+    felt = s.felt.force + gravity
+    total = real(0.0)
+    for k in range(3):
+        total = total + false_cue(wanted[k], felt[k], r.force_threshold[k], r.zone.force)
+        total = total + false_cue(s.wanted.rate[k], s.felt.rate[k], r.rate_threshold[k], r.zone.rate)
+    return total
+
+
+@wp.func
+def beyond(wanted: real, felt: real) -> real:
+    """The part of ``felt`` outside the interval between zero and ``wanted``."""
+    zero = real(0.0)
+    return felt - wp.clamp(felt, wp.min(wanted, zero), wp.max(wanted, zero))
+
+
+@wp.func
+def tilt_excess(r: RewardScale, s: State) -> real:
+    """Square of the tilt rate above its threshold, in thresholds."""
+    roll = beyond(s.wanted.rate[0], s.felt.rate[0])
+    pitch = beyond(s.wanted.rate[1], s.felt.rate[1])
+    excess = wp.max(wp.sqrt(roll * roll + pitch * pitch) / r.tilt_rate - real(1.0), real(0.0))
+    return excess * excess
+
+
+@wp.func
+def stroke_excess(r: RewardScale, m: Machine, s: State) -> real:
+    """Square of the travel used beyond the margin, over the way from there to the end, all actuators."""
+    total = real(0.0)
+    for k in range(9):
+        q = s.motion.position[k]
+        end = wp.where(q >= real(0.0), m.position_max[k], -m.position_min[k])
+        # A missing subsystem has no travel, and an unlimited one no end.
+        if end > real(0.0) and end < real(wp.static(UNLIMITED)):
+            excess = (wp.abs(q) / end - r.stroke_margin) / (real(1.0) - r.stroke_margin)
+            excess = wp.max(excess, real(0.0))
+            total = total + excess * excess
+    return total
+
+
+@wp.func
+def limited_share(limits: wp.uint64) -> real:
+    """Share of the nine actuators that a limit holds back."""
+    count = int(0)
+    for k in range(9):
+        if (wp.rshift(limits, wp.uint64(4 * k)) & wp.uint64(15)) != wp.uint64(0):
+            count = count + 1
+    return real(count) / real(9.0)
+
+
+@wp.func
+def has_failed(limits: wp.uint64) -> bool:
+    """Whether an end of travel or a nearly singular pose was met."""
+    return (limits & wp.uint64(wp.static(END_OF_TRAVEL | SINGULAR))) != wp.uint64(0)
+
+
+@wp.func
+def action_change(now: wp.array2d(dtype=wp.float32), before: wp.array2d(dtype=wp.float32), i: int) -> real:
+    """Mean square change of the action."""
+    total = real(0.0)
+    for k in range(now.shape[1]):
+        change = real(now[i, k]) - real(before[i, k])
+        total = total + change * change
+    return total / real(now.shape[1])
+
+
+@wp.func
+def terms_now(r: RewardScale, m: Machine, s: State, share: real) -> vec_terms:
+    """The terms of a time step that belong to the state, times ``share``."""
+    t = vec_terms()
+    t[0] = cue_error(r.zone, s)
+    t[1] = perceived_error(r.zone, s)
+    t[2] = false_cues(r, s)
+    t[3] = tilt_excess(r, s)
+    t[4] = stroke_excess(r, m, s)
+    t[5] = limited_share(s.limits)
+    return t * share
