@@ -1,0 +1,90 @@
+"""Policies on the environment's own observation, and what the reward says of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from motion_cueing.baselines import ClassicalWashout, NoMotion
+from motion_cueing.envs.car import get_maneuver, maneuver_names
+from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.observation import OBSERVATION_SIZE
+from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector
+from motion_cueing.evaluation import rollout
+
+from .tasks import drive
+
+POLICIES = {"no-motion": NoMotion(), **{n: ClassicalWashout(n) for n in ("classical", "est1", "brk")}}
+
+
+def headline(state: np.ndarray) -> np.ndarray:
+    """(n,) |df|^2 / 0.6^2 + |dw|^2 / (3 deg/s)^2 of every environment."""
+    force = (state["felt"]["force"] - state["wanted"]["force"]) / 0.6
+    rate = (state["felt"]["rate"] - state["wanted"]["rate"]) / math.radians(3.0)
+    return np.sum(force**2 + rate**2, axis=1)
+
+
+def scores(policy, drives: list[CueTrace]) -> tuple[np.ndarray, np.ndarray]:
+    """J and mean reward of a policy on each drive."""
+    n = len(drives)
+    env = DrivingSimulatorVector(n, drives=drives, autoreset_mode=AutoresetMode.DISABLED)
+    observation, _ = env.reset(seed=0, options={"drive": list(range(n))})
+    state, begins = None, np.ones(n, dtype=bool)
+    lengths = np.array([len(drive) for drive in drives])
+    costs, rewards = headline(env.batch.simulator.state), np.zeros(n)
+    for k in range(1, lengths.max()):
+        seen = observation[:, :OBSERVATION_SIZE]
+        acceleration, state = policy.predict(seen, state, begins, deterministic=True)
+        observation, reward, *_ = env.step(env.action_of(acceleration))
+        going, begins = k < lengths, np.zeros(n, dtype=bool)
+        costs += going * headline(env.batch.simulator.state)
+        rewards += going * reward
+    return costs / lengths, rewards / (lengths - 1)
+
+
+@pytest.fixture(scope="module")
+def suite() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    drives = [get_maneuver(name).drive() for name in maneuver_names()]
+    return {name: scores(policy, drives) for name, policy in POLICIES.items()}
+
+
+def test_default_reward_ranks_policies_as_the_headline_metric_does(suite):
+    for i, maneuver in enumerate(maneuver_names()):
+        by_cost = sorted(suite, key=lambda name: suite[name][0][i])
+        by_reward = sorted(suite, key=lambda name: -suite[name][1][i])
+        assert by_cost == by_reward, maneuver
+    by_cost = sorted(suite, key=lambda name: suite[name][0].mean())
+    by_reward = sorted(suite, key=lambda name: -suite[name][1].mean())
+    assert by_cost == by_reward
+    assert len({round(float(costs.mean()), 6) for costs, _ in suite.values()}) == len(POLICIES)
+
+
+def test_default_reward_is_the_headline_metric_and_little_more(suite):
+    for costs, rewards in suite.values():
+        assert np.all(-rewards > 0.99 * costs)
+        assert np.all(-rewards < 1.01 * costs)
+
+
+@pytest.mark.parametrize("name", ["classical", "est2", "brk"])
+def test_washout_on_the_observation_moves_as_in_a_rollout(name):
+    policy, cues = ClassicalWashout(name), drive(samples=601)
+    expected = rollout(policy, cues)
+    env = DrivingSimulator(drives=[cues])
+    observation, _ = env.reset(seed=0)
+    state, begins, k = None, np.ones(1, dtype=bool), 0
+    truncated = False
+    while not truncated:
+        acceleration, state = policy.predict(observation[None, :OBSERVATION_SIZE], state, begins)
+        observation, _, _, truncated, _ = env.step(env.action_of(acceleration[0]))
+        begins, k = np.zeros(1, dtype=bool), k + 1
+        motion = env.batch.simulator.state["motion"][0]
+        assert np.allclose(motion["position"][:2], expected.carriage[k], atol=1e-4)
+        assert np.allclose(motion["position"][2:8], expected.legs[k], atol=1e-4)
+        assert np.isclose(motion["position"][8], expected.turntable[k], atol=1e-4)
+        felt = env.batch.simulator.state["felt"][0]
+        assert np.allclose(felt["force"], expected.f_felt[k], atol=1e-3)
+        assert np.allclose(felt["rate"], expected.w_felt[k], atol=1e-4)
+    assert k == len(cues) - 1
