@@ -1,0 +1,116 @@
+"""The Stable-Baselines3 environment against a loop of single environments, and its library's own checks."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the extra `train`")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+from motion_cueing.envs.errors import ActionError, ConfigurationError
+from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions
+from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
+
+from ..env.tasks import EVERY_OPTION, SHORT, drive, options
+
+N = 3
+
+
+@pytest.mark.parametrize("name", EVERY_OPTION)
+def test_stable_baselines_checker_finds_nothing_to_warn_of(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(DrivingSimulator(**options(name)))
+
+
+@pytest.mark.parametrize("name", ["defaults", "stack", "residual", "termination"])
+def test_batch_is_stable_baselines_loop_of_single_environments(name):
+    batch = DrivingSimulatorVecEnv(N, **options(name))
+    loop = DummyVecEnv([lambda: Monitor(DrivingSimulator(**options(name)))] * N)
+    for envs in (batch, loop):
+        envs.seed(7)
+    assert np.array_equal(batch.reset(), loop.reset())
+    rng, ends = np.random.default_rng(0), 0
+    for _ in range(210):
+        action = rng.uniform(-1.0, 1.0, (N, 9)).astype(np.float32)
+        seen, expected = batch.step(action), loop.step(action)
+        for got, wanted in zip(seen[:3], expected[:3], strict=True):
+            assert np.array_equal(got, wanted)
+        for i in np.flatnonzero(seen[2]):
+            ends += 1
+            got, wanted = seen[3][i], expected[3][i]
+            assert np.array_equal(got["terminal_observation"], wanted["terminal_observation"])
+            assert got["TimeLimit.truncated"] == wanted["TimeLimit.truncated"]
+            assert got["episode"]["l"] == wanted["episode"]["l"]
+            assert got["episode"]["r"] == pytest.approx(wanted["episode"]["r"], rel=1e-5)
+    assert ends >= N
+
+
+def test_terms_of_an_episode_are_the_means_of_its_steps():
+    batch, single = DrivingSimulatorVecEnv(1, episode=SHORT), DrivingSimulator(episode=SHORT)
+    batch.seed(2)
+    batch.reset()
+    single.reset(seed=2)
+    action, infos, done = np.full(9, 0.1, dtype=np.float32), [], False
+    while not done:
+        *_, done, told = batch.step(action[None])
+        infos.append(single.step(action)[4])
+    for term in TERMS:
+        assert told[0]["terms"][term] == pytest.approx(np.mean([info[term] for info in infos]))
+
+
+def test_failure_is_not_told_as_the_end_of_time():
+    episode = EpisodeOptions(library=1, drive_duration=20.0, terminate_on_failure=True)
+    envs = DrivingSimulatorVecEnv(1, episode=episode)
+    envs.reset()
+    action, done = np.zeros((1, 9), dtype=np.float32), False
+    action[0, 0] = 1.0
+    while not done:
+        *_, done, infos = envs.step(action)
+    assert infos[0]["TimeLimit.truncated"] is False
+    assert infos[0]["terms"]["failure"] > 0.0
+
+
+def test_options_choose_drives_for_all_or_none():
+    envs = DrivingSimulatorVecEnv(2, drives=[drive("a"), drive("b")])
+    envs.set_options([{"drive": "b"}, {"drive": "a"}])
+    envs.reset()
+    assert list(envs.batch.simulator.drive_of) == [1, 0]
+    envs.set_options([{"drive": "b"}, {}])
+    with pytest.raises(ConfigurationError, match="every environment or for none"):
+        envs.reset()
+
+
+def test_attributes_and_methods_are_those_of_the_whole_batch():
+    envs = DrivingSimulatorVecEnv(2, episode=SHORT)
+    assert envs.get_attr("render_mode") == [None, None]
+    envs.set_attr("note", 3)
+    assert envs.get_attr("note", indices=[1]) == [3]
+    assert envs.env_method("action_of", np.zeros(9))[1].shape == (9,)
+    assert envs.env_is_wrapped(Monitor) == [True, True]
+    assert envs.env_is_wrapped(VecNormalize) == [False, False]
+    with pytest.raises(ConfigurationError, match="indices must be None"):
+        envs.set_attr("note", 4, indices=0)
+    with pytest.raises(ActionError, match="not finite"):
+        envs.step(np.full((2, 9), np.nan))
+
+
+def test_an_agent_learns_on_it_and_is_evaluated():
+    envs = VecNormalize(DrivingSimulatorVecEnv(4, episode=SHORT))
+    agent = PPO("MlpPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    agent.learn(256)
+    assert len(agent.ep_info_buffer) >= 4
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mean, _ = evaluate_policy(agent, envs, n_eval_episodes=2)
+    assert np.isfinite(mean)
+    envs.close()

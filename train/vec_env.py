@@ -1,0 +1,162 @@
+"""Stable-Baselines3's vector environment over the batch: no processes, and no loop over environments."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
+
+from ..envs.cues import CueTrace
+from ..envs.errors import ConfigurationError
+from ..envs.task.batch import Batch
+from ..envs.task.environment import normalised
+from ..envs.task.options import TaskOptions
+from ..envs.task.reward_kernel import N_TERMS, TERMS
+from ..envs.task.spaces import action_space, observation_space, task_options
+
+
+class DrivingSimulatorVecEnv(VecEnv):
+    """A batch of driving simulators; environment i is the single environment with seed ``seed + i``.
+
+    An environment that ends begins anew in the same step, and says in its info:
+    ``terminal_observation``; ``TimeLimit.truncated``; ``episode`` with return ``r``, length ``l`` and time
+    ``t`` as ``Monitor`` has them; ``terms`` with the mean of each term of the reward over the episode.
+
+    Args:
+        num_envs: Environments.
+        task: Everything that can be chosen; default: all defaults.
+        drives: Cue traces to drive instead of those of ``task.episode``.
+        base: The base policy of the action modes "residual" and "gains".
+        device: "cpu" or a CUDA device of Warp.
+        **fields: Fields of ``TaskOptions`` to replace, as dataclasses or dictionaries.
+
+    Raises:
+        ConfigurationError: an option is unknown, of the wrong type or out of range.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: TaskOptions | None = None,
+        *,
+        drives: Sequence[CueTrace] | None = None,
+        base: Any = None,
+        device: str = "cpu",
+        **fields: Any,
+    ) -> None:
+        self.task = task_options(task, fields)
+        self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
+        self.render_mode: str | None = None
+        super().__init__(num_envs, observation_space(self.batch), action_space(self.batch))
+        self._seeded = False
+        self._began = time.perf_counter()
+        self._returns = np.zeros(num_envs)
+        self._sums = np.zeros((num_envs, N_TERMS))
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+
+    def action_of(self, acceleration: ArrayLike) -> NDArray[np.float32]:
+        """Actions of the mode "acceleration" for accelerations (..., 9), m/s^2 and rad/s^2."""
+        return normalised(acceleration, self.batch.scale)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin new episodes, with the seeds and options given since the last reset."""
+        everywhere = np.ones(self.num_envs, dtype=bool)
+        if not self._seeded and self._seeds[0] is None:
+            self.seed()
+        if self._seeds[0] is not None:
+            self.batch.seed(everywhere, [int(seed or 0) for seed in self._seeds])
+            self._seeded = True
+        drives = [options.get("drive") for options in self._options]
+        given = [drive for drive in drives if drive is not None]
+        if given and len(given) < self.num_envs:
+            raise ConfigurationError("option drive must be given for every environment or for none")
+        self._begin(everywhere, self.batch.drive_indices(given) if given else None)
+        self._reset_seeds()
+        self._reset_options()
+        return self.batch.arrays.observation.pull().copy()
+
+    def _begin(self, mask: NDArray[np.bool_], drive: NDArray[np.int32] | None = None) -> None:
+        self.batch.begin(mask, drive)
+        self.batch.observe(mask)
+        self._returns[mask], self._sums[mask], self._steps[mask] = 0.0, 0.0, 0
+
+    def step_async(self, actions: ArrayLike) -> None:
+        """Take actions (n, k), which :meth:`step_wait` plays.
+
+        Raises:
+            ActionError: a wrong shape, or a value that is not finite.
+        """
+        self.batch.write(actions)
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Play the actions; an ended environment returns the first observation of its next episode."""
+        batch, arrays = self.batch, self.batch.arrays
+        batch.step()
+        reward = arrays.reward.pull().astype(np.float32)
+        terminated, truncated = arrays.terminated.pull().copy(), arrays.truncated.pull().copy()
+        self._returns += reward
+        self._sums += arrays.terms.pull()
+        self._steps += 1
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        ended = terminated | truncated
+        if ended.any():
+            for i in np.flatnonzero(ended).tolist():
+                infos[i] = self._final_info(i, bool(truncated[i] and not terminated[i]))
+            self._begin(ended)
+        return arrays.observation.pull().copy(), reward, ended, infos
+
+    def _final_info(self, i: int, truncated: bool) -> dict[str, Any]:
+        elapsed = round(time.perf_counter() - self._began, 6)
+        means = (self._sums[i] / self._steps[i]).tolist()
+        return {
+            "terminal_observation": self.batch.arrays.observation.pull()[i].copy(),
+            "TimeLimit.truncated": truncated,
+            "episode": {"r": float(self._returns[i]), "l": int(self._steps[i]), "t": elapsed},
+            "terms": dict(zip(TERMS, means, strict=True)),
+        }
+
+    def close(self) -> None:
+        """Nothing is to be closed."""
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute, the same for every environment."""
+        value = getattr(self, attr_name)
+        return [value for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Set an attribute for all environments.
+
+        Raises:
+            ConfigurationError: only some are named; they share one batch.
+        """
+        self._refuse_some(indices)
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method once, for all environments.
+
+        Raises:
+            ConfigurationError: only some are named; they share one batch.
+        """
+        self._refuse_some(indices)
+        value = getattr(self, method_name)(*method_args, **method_kwargs)
+        return [value] * self.num_envs
+
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
+    ) -> list[bool]:
+        """Only as ``Monitor`` would: episodes are told in ``info``."""
+        return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
+
+    def _refuse_some(self, indices: VecEnvIndices) -> None:
+        if len(list(self._get_indices(indices))) != self.num_envs:
+            raise ConfigurationError("indices must be None: the environments of a batch share attributes")
