@@ -145,5 +145,8 @@ class ClassicalWashout:
 
     def _make_buffers(self, n: int) -> _Buffers:
         parameters_of = wp.zeros(n, dtype=int, device="cpu")
-        self._buffers[n] = _Buffers(n, self._kernel_parameters, parameters_of, self.dt)
+        return self._buffers_with(n, self._kernel_parameters, parameters_of)
+
+    def _buffers_with(self, n: int, parameters: Any, parameters_of: Any) -> _Buffers:
+        self._buffers[n] = _Buffers(n, parameters, parameters_of, self.dt)
         return self._buffers[n]

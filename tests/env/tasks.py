@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from motion_cueing.baselines.washout import ClassicalWashout
+from motion_cueing.baselines.washout import ClassicalWashout, ScheduledWashout
 from motion_cueing.envs.car import RandomDrives
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.task import (
@@ -29,6 +29,7 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     "jerk": {"action": ActionOptions(mode="jerk")},
     "velocity": {"action": ActionOptions(mode="velocity")},
     "residual": {"action": ActionOptions(mode="residual", authority=0.1), "base": ClassicalWashout()},
+    "gains": {"action": ActionOptions(mode="gains"), "base": ScheduledWashout()},
     "frozen": {"action": ActionOptions(frozen=("turntable", "carriage_x", "carriage_y"))},
     "repeat": {"action": ActionOptions(repeat=5)},
     "authority": {"action": ActionOptions(authority=0.2)},

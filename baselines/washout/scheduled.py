@@ -1,0 +1,100 @@
+"""The washout with parameters that are set anew at every step: what an agent that schedules gains acts on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import warp as wp
+
+from ...envs.errors import ActionError, ConfigurationError
+from ...envs.platform.machines import Cab
+from ...envs.simulator import TIME_STEP
+from ..policy import Array
+from .parameters import WashoutParameters
+from .policy import ClassicalWashout, kernel_parameters
+from .step import Parameters
+
+KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
+    "cue_scale": ("force_scale", "rate_scale"),
+    "hpr": ("hpr_roll.frequency", "hpr_pitch.frequency", "hpr_yaw.frequency"),
+    "tilt_low_pass": ("tilt_frequency",),
+    "hps": ("hps_x.frequency", "hps_y.frequency"),
+    "hpi": ("hpi_x.frequency", "hpi_y.frequency", "hpi_z.frequency"),
+    "lpc": ("lpc_frequency",),
+}
+"""Each gain's name, and the parameters of the kernel that it multiplies."""
+
+
+class ScheduledWashout(ClassicalWashout):
+    """A washout whose cue scale and break frequencies an agent turns, each between 1 / span and span times.
+
+    Args:
+        parameters: A parameter set, a preset name or a YAML file: where all gains are 0.
+        cab: Where the driver sits on the machine.
+        dt: Time step, s.
+        span: Largest factor, at a gain of 1.
+
+    Raises:
+        ConfigurationError: ``span`` is not above 1.
+    """
+
+    def __init__(
+        self,
+        parameters: WashoutParameters | str | Path = "classical",
+        cab: Cab | None = None,
+        dt: float = TIME_STEP,
+        span: float = 2.0,
+    ) -> None:
+        if not span > 1.0:
+            raise ConfigurationError(f"span must be above 1, found {span}")
+        self._tables: dict[int, Any] = {}
+        super().__init__(parameters, cab, dt)
+        self.span = span
+        self._neutral = self._kernel_parameters.numpy().copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made anew: Warp's arrays cannot be."""
+        return type(self), (self.parameters, self.cab, self.dt, self.span)
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """What each gain turns."""
+        return tuple(KNOBS)
+
+    def schedule(
+        self, observation: Array, gains: Array, state: Any = None, episode_start: Array | None = None
+    ) -> tuple[Array, Any]:
+        """Accelerations (n, 9) for observations (n, OBSERVATION_SIZE) with gains (n, k) in [-1, 1].
+
+        Raises:
+            ActionError: the gains have the wrong shape, or are not finite.
+        """
+        n, gains = len(observation), np.asarray(gains, dtype=np.float64)
+        if gains.shape != (n, len(KNOBS)) or not np.isfinite(gains).all():
+            raise ActionError(f"gains must be finite and of shape ({n}, {len(KNOBS)}), found {gains.shape}")
+        if n not in self._buffers:
+            self._make_buffers(n)
+        self._turn(self._tables[n], self.span**gains)
+        action, after = self.predict(observation, state, episode_start)
+        self._turn(self._tables[n], np.ones_like(gains))
+        return action, after
+
+    def _turn(self, table: Array, factors: Array) -> None:
+        """Write the parameters of every environment, ``factors`` (n, k) times the neutral ones."""
+        for k, names in enumerate(KNOBS.values()):
+            for name in names:
+                field, *inner = name.split(".")
+                target, neutral = table[field], self._neutral[field]
+                if inner:
+                    target, neutral = target[inner[0]], neutral[inner[0]]
+                factor = factors[:, k].reshape(-1, *[1] * (target.ndim - 1))
+                target[...] = neutral * factor
+
+    def _make_buffers(self, n: int) -> Any:
+        values = [kernel_parameters(self.parameters, self.cab)] * n
+        parameters = wp.array(values, dtype=Parameters, device="cpu")
+        self._tables[n] = parameters.numpy()
+        return self._buffers_with(n, parameters, wp.array(np.arange(n), dtype=int, device="cpu"))
