@@ -23,7 +23,8 @@ def commands(n: int, scale: float = 1.0) -> np.ndarray:
     """(PERIOD, n, 9) accelerations that integrate to a closed path."""
     rng = np.random.default_rng(0)
     turns = rng.integers(1, 6, size=(n, 9))
-    phase = 2.0 * np.pi * np.arange(PERIOD)[:, None, None] / PERIOD
+    # Taken in the middle of each step, so that the speed has no mean and the path closes for ever.
+    phase = 2.0 * np.pi * (np.arange(PERIOD)[:, None, None] + 0.5) / PERIOD
     return scale * AMPLITUDE * np.cos(turns * phase)
 
 
