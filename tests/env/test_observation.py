@@ -1,0 +1,199 @@
+"""Every row of the observation against the simulator's state and the drive, in plain NumPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motion_cueing.baselines.washout import ClassicalWashout
+from motion_cueing.envs.observation import ROWS, SLICES
+from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomisationOptions
+from motion_cueing.envs.task.layout import (
+    BASE,
+    COMMAND,
+    DIFFERENCE,
+    PERCEIVED,
+    TRUE_MOTION,
+    last_action_row,
+    preview_row,
+)
+
+from .tasks import drive
+
+GRAVITY = np.array([0.0, 0.0, 9.81])
+LAG = RandomisationOptions(natural_frequency=(15.0, 15.0), machines=1)
+
+
+def moved(steps: int = 50, **arguments) -> tuple[DrivingSimulator, np.ndarray]:
+    """An environment after some steps of sines, and its observation."""
+    env = DrivingSimulator(**({"drives": [drive()]} | arguments))
+    observation, _ = env.reset(seed=0)
+    for k in range(steps):
+        observation, *_ = env.step(0.1 * np.sin(0.1 * k + np.arange(9)))
+    return env, observation
+
+
+def row(env: DrivingSimulator, observation: np.ndarray, name: str, frame: int = 0) -> np.ndarray:
+    layout = env.batch.layout
+    scale = {row.name: row.scale for row in layout.rows}[name]
+    return scale * observation[layout.frame * frame :][layout.slices[name]].astype(np.float64)
+
+
+def close(a, b) -> bool:
+    return bool(np.allclose(a, b, rtol=1e-6, atol=1e-6))
+
+
+def test_fixed_rows_are_those_of_the_policies_observation():
+    env, observation = moved()
+    assert env.batch.layout.rows[: len(ROWS)] == ROWS
+    for name, where in SLICES.items():
+        assert env.batch.layout.slices[name] == where
+    assert close(observation[: env.batch.arrays.core.view.shape[1]], env.batch.arrays.core.view[0])
+
+
+def test_cues_platform_and_legs_are_the_simulators():
+    env, observation = moved()
+    state = env.batch.simulator.state[0]
+    p = state["setpoint"]
+    expected = {
+        "wanted_force": state["wanted"]["force"] + GRAVITY,
+        "wanted_rate": state["wanted"]["rate"],
+        "felt_force": state["felt"]["force"] + GRAVITY,
+        "felt_rate": state["felt"]["rate"],
+        "force_error": state["wanted"]["force"] - state["felt"]["force"],
+        "rate_error": state["wanted"]["rate"] - state["felt"]["rate"],
+        "carriage": p["position"][:2],
+        "carriage_rate": p["rate"][:2],
+        "displacement": p["displacement"],
+        "velocity": p["velocity"],
+        "beta": p["beta"],
+        "beta_rate": p["beta_rate"],
+        "turntable": [np.sin(p["position"][8]), np.cos(p["position"][8])],
+        "turntable_rate": p["rate"][8:],
+        "legs": p["position"][2:8] / 0.67,
+        "leg_rates": p["rate"][2:8] / 1.0,
+        "acceleration": state["acceleration"],
+        "last_action": 0.1 * np.sin(4.9 + np.arange(9)),
+    }
+    assert set(expected) == set(env.batch.layout.slices)
+    for name, values in expected.items():
+        assert close(row(env, observation, name), values), name
+    assert np.array_equal(state["wanted"]["force"], drive().specific_force[50])
+
+
+@pytest.mark.parametrize("steps", [0, 50, 280])
+def test_preview_is_the_drive_ahead_and_its_last_cue_after_its_end(steps):
+    options = ObservationOptions(preview=4, preview_spacing=0.25)
+    env, observation = moved(steps, observation=options)
+    cues, ahead = drive(), np.minimum(steps + 25 * np.arange(1, 5), 300)
+    seen = row(env, observation, "preview").reshape(4, 6)
+    assert close(10.0 * seen[:, :3], cues.specific_force[ahead] + GRAVITY)
+    assert close(seen[:, 3:], cues.angular_velocity[ahead])
+
+
+def test_perceived_rows_are_what_is_sensed():
+    env, observation = moved(observation=ObservationOptions(perceived=True))
+    state = env.batch.simulator.state[0]
+    for side in ("wanted", "felt"):
+        sensed = state[f"sensed_{side}"]
+        assert close(row(env, observation, f"sensed_{side}_force"), sensed["force"] + GRAVITY)
+        assert close(row(env, observation, f"sensed_{side}_rate"), sensed["rate"])
+        assert np.abs(sensed["rate"]).max() > 1e-3
+
+
+def test_true_motion_is_behind_the_set_points_where_actuators_lag():
+    env, observation = moved(observation=ObservationOptions(true_motion=True), randomisation=LAG)
+    true = env.batch.simulator.state[0]["motion"]
+    expected = {
+        "true_carriage": true["position"][:2],
+        "true_carriage_rate": true["rate"][:2],
+        "true_displacement": true["displacement"],
+        "true_velocity": true["velocity"],
+        "true_beta": true["beta"],
+        "true_beta_rate": true["beta_rate"],
+        "true_turntable": [np.sin(true["position"][8]), np.cos(true["position"][8])],
+        "true_turntable_rate": true["rate"][8:],
+    }
+    for name, values in expected.items():
+        assert close(row(env, observation, name), values), name
+        if name != "true_turntable":
+            assert not close(row(env, observation, name.removeprefix("true_")), values), name
+
+
+def test_stack_holds_earlier_observations_the_newest_first():
+    arguments = {"drives": [drive()], "seed": 0}
+    stacked = DrivingSimulator(drives=arguments["drives"], observation=ObservationOptions(stack=3))
+    single = DrivingSimulator(drives=arguments["drives"])
+    seen, first = stacked.reset(seed=0)[0], single.reset(seed=0)[0]
+    frames = [first, first, first]
+    for k in range(6):
+        assert np.array_equal(seen, np.concatenate(frames))
+        action = np.full(9, 0.01 * k, dtype=np.float32)
+        seen, frames = stacked.step(action)[0], [single.step(action)[0], *frames[:2]]
+
+
+def test_command_and_base_action_are_shown_where_the_mode_needs_them():
+    env, observation = moved(action=ActionOptions(mode="jerk"))
+    assert close(
+        row(env, observation, "command"), env.batch.arrays.command.view["acceleration"][0].astype(np.float32)
+    )
+    policy = ClassicalWashout()
+    env, observation = moved(0, action=ActionOptions(mode="residual"), base=ClassicalWashout())
+    expected, _ = policy.predict(env.batch.arrays.core.view[0])
+    assert close(row(env, observation, "base_action"), expected)
+
+
+def test_sensors_err_in_gain_and_noise_and_only_they_do():
+    noisy = RandomisationOptions(sensor_gain=0.2, force_noise=0.3, rate_noise=0.02)
+    env, clean = DrivingSimulator(drives=[drive()], randomisation=noisy), DrivingSimulator(drives=[drive()])
+    seen, expected = [env.reset(seed=1)[0]], [clean.reset(seed=1)[0]]
+    for _ in range(250):
+        seen.append(env.step(np.zeros(9))[0])
+        expected.append(clean.step(np.zeros(9))[0])
+    error = np.array(seen) - np.array(expected)
+    touched = {"felt_force": 0.03, "felt_rate": 0.02, "force_error": 0.03, "rate_error": 0.02}
+    for name, where in env.batch.layout.slices.items():
+        if name not in touched:
+            assert not error[:, where].any(), name
+            continue
+        # The standard deviation of 750 samples is within 4 standard errors of the true one.
+        assert np.std(error[:, where]) == pytest.approx(touched[name], rel=4.0 / np.sqrt(2 * 750)), name
+    felt, difference = (error[:, env.batch.layout.slices[name]] for name in ("felt_force", "force_error"))
+    assert np.allclose(felt, -difference, atol=1e-6)
+
+
+def test_noise_differs_from_step_to_step_and_from_episode_to_episode():
+    env = DrivingSimulator(drives=[drive()], randomisation=RandomisationOptions(force_noise=0.3))
+    where = env.batch.layout.slices["felt_force"]
+    seen = [env.reset(seed=1)[0][where], env.step(np.zeros(9))[0][where], env.reset()[0][where]]
+    assert len({part.tobytes() for part in seen}) == 3
+
+
+def documented_rows() -> list[tuple[str, ...]]:
+    """Name, entries, unit, scale and bound of every row of the page's tables."""
+    page = (Path(__file__).parents[2] / "docs" / "environment.md").read_text(encoding="utf-8")
+    lines = [line.split("|") for line in page.splitlines() if line.startswith("| `")]
+    return [tuple(cell.strip().strip("`") for cell in line[1:6]) for line in lines if len(line) == 8]
+
+
+def test_page_tells_every_row_as_it_is():
+    rows = [*ROWS, *DIFFERENCE, last_action_row(9), COMMAND, BASE, preview_row(1), *PERCEIVED, *TRUE_MOTION]
+    expected = []
+    for r in rows:
+        size = "6 each" if r.name == "preview" else str(r.size)
+        expected.append((r.name, size, r.unit, f"{r.scale:g}", f"{r.bound:g}"))
+    assert documented_rows() == expected
+
+
+def test_entries_beyond_their_bound_are_clipped():
+    cues = drive()
+    wild = np.array(cues.specific_force)
+    wild[10:] += 500.0
+    env = DrivingSimulator(drives=[type(cues)("wild", cues.time, wild, cues.angular_velocity)])
+    observation, _ = env.reset(seed=0)
+    for _ in range(20):
+        observation, *_ = env.step(np.zeros(9))
+    assert np.array_equal(observation[:3], [10.0, 10.0, 10.0])
+    assert observation in env.observation_space

@@ -1,0 +1,100 @@
+"""Every term of the reward against its definition in plain NumPy, and the ends of episodes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions, RewardOptions, RewardWeights
+from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.evaluation import signals
+from motion_cueing.evaluation.criteria import Criteria
+
+from .tasks import drive
+
+REST = np.array([0.0, 0.0, -9.81])
+C = Criteria()
+
+
+def six(cues: np.void) -> np.ndarray:
+    """Force relative to rest, and rate."""
+    return np.concatenate([cues["force"] - REST, cues["rate"]])
+
+
+def expected_terms(env: DrivingSimulator, action: np.ndarray, before: np.ndarray) -> dict[str, float]:
+    state = env.batch.simulator.state[0]
+    wanted, felt = six(state["wanted"]), six(state["felt"])
+    sensed = six(state["sensed_felt"]) - six(state["sensed_wanted"])
+    error = ((felt - wanted) / np.array(C.scales)) ** 2
+    false = [signals.false_cues(wanted[i : i + 1], felt[i : i + 1], C.thresholds[i])[0] for i in range(6)]
+    extra = signals.beyond(wanted[3:5], felt[3:5])
+    position = state["motion"]["position"]
+    use = np.abs(position[:8]) / np.array([13.72] * 2 + [0.67] * 6)
+    active = [(int(state["limits"]) >> (4 * k)) & 15 for k in range(9)]
+    return {
+        "cue_error": float(error.sum()),
+        "perceived_error": float(np.sum((sensed / np.array(C.scales)) ** 2)),
+        "false_cues": float(error[false].sum()),
+        "tilt_rate": max(math.hypot(*extra) / C.tilt_rate - 1.0, 0.0) ** 2,
+        "stroke": float(np.sum(np.maximum((use - 0.8) / 0.2, 0.0) ** 2)),
+        "limits": float(np.mean([flags != 0 for flags in active])),
+        "action_rate": float(np.mean((action.astype(float) - before.astype(float)) ** 2)),
+        "failure": 0.0,
+    }
+
+
+def test_terms_are_what_they_are_defined_to_be():
+    weights = RewardWeights(*(0.1 * (k + 1) for k in range(len(TERMS))))
+    env = DrivingSimulator(drives=[drive()], reward=RewardOptions(weights=weights))
+    rng, before, seen = np.random.default_rng(1), np.zeros(9, dtype=np.float32), []
+    env.reset(seed=0)
+    push = rng.uniform(-0.5, 0.5, 9)
+    for k in range(300):
+        noise = rng.uniform(-0.3, 0.3, 9)
+        action = (push * np.sin(0.02 * k) + noise).astype(np.float32)
+        _, reward, _, _, info = env.step(action)
+        expected = expected_terms(env, action, before)
+        for name in TERMS:
+            assert info[name] == pytest.approx(expected[name], rel=1e-9, abs=1e-12), name
+        total = sum(getattr(weights, name) * expected[name] for name in TERMS)
+        assert reward == pytest.approx(-total, rel=1e-9)
+        before = action
+        seen.append([info[name] for name in TERMS])
+    # Every term but failure was there and was not always the same.
+    assert np.all(np.ptp(np.array(seen), axis=0)[:-1] > 0.0)
+
+
+def test_zero_weights_switch_terms_off():
+    weights = RewardWeights(**dict.fromkeys(TERMS, 0.0))
+    env = DrivingSimulator(drives=[drive()], reward=RewardOptions(weights=weights))
+    env.reset(seed=0)
+    for _ in range(20):
+        _, reward, _, _, info = env.step(np.ones(9))
+        assert reward == 0.0
+        assert info["cue_error"] > 0.0
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_an_end_of_travel_terminates_only_where_asked(asked):
+    episode = EpisodeOptions(terminate_on_failure=asked)
+    env = DrivingSimulator(drives=[drive(samples=1001)], episode=episode)
+    env.reset(seed=0)
+    action, ended = np.zeros(9), False
+    action[0] = 1.0
+    for _ in range(1000):
+        _, reward, terminated, truncated, info = env.step(action)
+        at_end = bool(int(env.batch.simulator.state["limits"][0]) & 1)
+        assert terminated == (asked and at_end)
+        assert info["failure"] == float(terminated)
+        ended |= at_end
+        if terminated:
+            assert reward <= -RewardWeights().failure
+            break
+    assert ended
+    assert truncated == (not asked)
+
+
+def test_terms_have_weights_of_the_same_names():
+    assert list(TERMS) == list(RewardWeights.__dataclass_fields__)
