@@ -118,9 +118,8 @@ class Batch:
     def step(self) -> None:
         """Advance by one action, which lies in ``arrays.action``; rewards, ends and observations are new."""
         arrays, repeat = self.arrays, self.options.action.repeat
-        arrays.action.push()
         if self.base.scheduled:
-            self._ask(np.clip(arrays.action.view, -1.0, 1.0))
+            self._ask(np.clip(arrays.action.pull(), -1.0, 1.0))
         for k in range(repeat):
             parts = NOTHING if k < repeat - 1 else CORE if self.base.residual else ALL
             self._launches.play(k == 0, parts)
@@ -159,6 +158,7 @@ class Batch:
         if not np.isfinite(values).all():
             raise ActionError(f"action is not finite: {values[~np.isfinite(values)][:3]} among its entries")
         self.arrays.action.view[...] = values
+        self.arrays.action.push()
 
     def drive_indices(self, names: str | int | Sequence[str | int]) -> NDArray[np.int32]:
         """Indices into :attr:`drives`, of drives by index or name.
