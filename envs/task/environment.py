@@ -15,7 +15,7 @@ from ..errors import ActionError
 from .batch import Batch
 from .options import TaskOptions
 from .reward_kernel import TERMS
-from .spaces import action_space, observation_space, task_options
+from .spaces import action_space, checked_render_mode, observation_space, task_options
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
@@ -28,6 +28,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         task: Everything that can be chosen; default: all defaults.
         drives: Cue traces to drive instead of those of ``task.episode``.
         base: The base policy of the action modes "residual" and "gains".
+        render_mode: One of ``metadata["render_modes"]``, or None.
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 
     Raises:
@@ -42,9 +43,11 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         *,
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,
+        render_mode: str | None = None,
         **fields: Any,
     ) -> None:
-        EzPickle.__init__(self, task, drives=drives, base=base, **fields)
+        EzPickle.__init__(self, task, drives=drives, base=base, render_mode=render_mode, **fields)
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
         self.task = task_options(task, fields)
         self.batch = Batch(1, self.task, drives=drives, base=base)
         self.observation_space = observation_space(self.batch)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box, Space
 
+from ..errors import ConfigurationError
 from ..settings import from_dict
 from .batch import Batch
 from .options import TaskOptions
@@ -32,3 +33,15 @@ def task_options(task: TaskOptions | None, fields: dict[str, Any]) -> TaskOption
     """
     start = {} if task is None else {f.name: getattr(task, f.name) for f in dataclasses.fields(TaskOptions)}
     return from_dict(TaskOptions, start | fields, "environment options")
+
+
+def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
+    """``mode``, if an environment with this metadata has it.
+
+    Raises:
+        ConfigurationError: it has not.
+    """
+    known = metadata["render_modes"]
+    if mode is not None and mode not in known:
+        raise ConfigurationError(f"render_mode {mode!r} is none of {known}; leave it out")
+    return mode

@@ -16,7 +16,7 @@ from .batch import Batch
 from .environment import normalised
 from .options import TaskOptions
 from .reward_kernel import TERMS
-from .spaces import action_space, observation_space, task_options
+from .spaces import action_space, checked_render_mode, observation_space, task_options
 
 Mask = NDArray[np.bool_]
 Info = dict[str, Any]
@@ -34,6 +34,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         autoreset_mode: When an ended environment begins anew; Gymnasium's default is with the next step.
         copy: Whether observations are copies; else each step overwrites those of the one before.
         device: "cpu" or a CUDA device of Warp.
+        render_mode: One of ``metadata["render_modes"]``, or None.
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 
     Raises:
@@ -52,9 +53,11 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         device: str = "cpu",
+        render_mode: str | None = None,
         **fields: Any,
     ) -> None:
         super().__init__()
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
         self.task = task_options(task, fields)
         self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
         self.num_envs = num_envs

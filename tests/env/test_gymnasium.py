@@ -11,6 +11,8 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import motion_cueing.envs
 from motion_cueing.envs.errors import ActionError, ConfigurationError, UnknownNameError
@@ -48,6 +50,19 @@ def test_make_vec_gives_the_native_batch():
     assert isinstance(envs, DrivingSimulatorVector)
     assert envs.num_envs == 3
     assert envs.observation_space.shape == (3, 67)
+
+
+def test_gymnasiums_wrappers_of_batches_accept_it():
+    envs = gymnasium.make_vec(
+        ID, num_envs=2, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=None, episode=SHORT
+    )
+    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    envs = RecordEpisodeStatistics(envs)
+    envs.reset(seed=0)
+    for _ in range(40):
+        *_, truncated, info = envs.step(np.zeros((2, 9), dtype=np.float32))
+    assert truncated.all()
+    assert list(info["final_info"]["episode"]["l"]) == [40, 40]
 
 
 @pytest.mark.parametrize("name", EVERY_OPTION)
@@ -151,6 +166,7 @@ def test_action_outside_the_box_is_clipped_and_counted():
         ({"action": {"mode": "gains"}}, "'gains' needs base="),
         ({"base": object()}, "base= is of no use"),
         ({"randomisation": {"dead_time": [0.2, 0.1]}}, "dead_time must be a range"),
+        ({"render_mode": "ansi"}, "render_mode 'ansi' is none of"),
         ({"vestibular": "nobody"}, "unknown vestibular model"),
     ],
 )
