@@ -46,6 +46,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         ".list_command", "ListCommand", "show the names of policies, maneuvers, motion bases and cars"
     ),
     "import": Command(".import_command", "ImportCommand", "turn a log of a drive into cues"),
+    "render": Command(".render_command", "RenderCommand", "draw a drive as a film or a picture"),
 }
 
 

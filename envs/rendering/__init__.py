@@ -1,0 +1,8 @@
+"""Pictures of a machine in motion; they need the extra ``render``."""
+
+from .backend import RenderingUnavailableError
+from .cue_history import CueHistory
+from .motion_view import MotionView
+from .renderer import FRAMES_PER_SECOND, Renderer
+
+__all__ = ["FRAMES_PER_SECOND", "CueHistory", "MotionView", "Renderer", "RenderingUnavailableError"]
