@@ -62,7 +62,7 @@ def test_gymnasiums_wrappers_of_batches_accept_it():
     for _ in range(40):
         *_, truncated, info = envs.step(np.zeros((2, 9), dtype=np.float32))
     assert truncated.all()
-    assert list(info["final_info"]["episode"]["l"]) == [40, 40]
+    assert list(info["episode"]["l"]) == [40, 40]
 
 
 @pytest.mark.parametrize("name", EVERY_OPTION)
