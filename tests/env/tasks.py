@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,14 +35,12 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     "repeat": {"action": ActionOptions(repeat=5)},
     "authority": {"action": ActionOptions(authority=0.2)},
     "reward": {"reward": RewardOptions(weights=RewardWeights(perceived_error=1.0, false_cues=1.0))},
-    "termination": {"episode": EpisodeOptions(library=2, drive_duration=2.0, terminate_on_failure=True)},
-    "maneuver": {"episode": EpisodeOptions(drives=("braking",), duration=1.0)},
-    "recording": {"episode": EpisodeOptions(drives=("commute",), duration=1.0, random_start=True)},
-    "offset": {"episode": EpisodeOptions(library=2, drive_duration=2.0, platform_offset=0.5)},
+    "termination": {"episode": replace(SHORT, terminate_on_failure=True)},
+    "maneuver": {"episode": replace(SHORT, drives=("braking",))},
+    "recording": {"episode": replace(SHORT, drives=("commute",))},
+    "offset": {"episode": replace(SHORT, platform_offset=0.5)},
     "cars": {
-        "episode": EpisodeOptions(
-            library=2, drive_duration=2.0, random=RandomDrives(cars=("sedan", "bmw-320i"))
-        ),
+        "episode": replace(SHORT, random=RandomDrives(cars=("sedan", "bmw-320i"))),
         "randomisation": RandomisationOptions(friction=(0.7, 1.0)),
     },
     "actuators": {
