@@ -13,7 +13,7 @@ from ..platform.machines import Carriage, Hexapod, Platform
 from . import theme
 from .car_body import LENGTH, dashboard, seat, seat_back, shell, steering_wheel, wheels
 from .driver_figure import driver_figure
-from .mesh import Mesh, box, circle, joined, prism, sphere
+from .mesh import Mesh, box, circle, joined, mesh, prism, sphere
 from .motion_view import rotation
 
 Floats = NDArray[np.float64]
@@ -34,6 +34,8 @@ _PIECE: Final = 2.0
 _HEAD_ABOVE_GROUND: Final = 1.19
 """Of the driver in the car's body, m."""
 _HEAD_IN_BODY: Final = np.array([-0.10, -0.35, -_HEAD_ABOVE_GROUND])
+_ABOVE: Final = 0.002
+"""Height of the marks over the deck, m."""
 _OVERHANG: Final = 1.15
 """Of turntable and platform beyond the upper joints."""
 
@@ -176,13 +178,15 @@ def _cuts(low: float, high: float) -> Floats:
 
 def _scale_marks(radius: float, deck: float) -> Mesh:
     """Ticks along the deck's edge, every 15 degrees, and an arrow head at the front."""
-    tick = radius * np.array([[0.98, 0.012], [0.90, 0.012], [0.90, -0.012], [0.98, -0.012]])[::-1]
-    pointer = radius * np.array([[0.985, 0.0], [0.85, 0.085], [0.85, -0.085]])
-    ticks = [
-        prism(tick @ rotation(np.array([0.0, 0.0, -a]))[:2, :2], deck - 0.003, deck - 0.001, theme.STEEL)
-        for a in np.radians(np.arange(15.0, 360.0, 15.0))
-    ]
-    return joined(*ticks, prism(pointer, deck - 0.003, deck - 0.001, theme.FELT))
+    tick = radius * np.array([[0.90, 0.012], [0.98, 0.012], [0.98, -0.012], [0.90, -0.012]])
+    pointer = radius * np.array([[0.985, 0.0], [0.85, -0.085], [0.85, -0.085], [0.85, 0.085]])
+    turns = [rotation(np.array([0.0, 0.0, a]))[:2, :2] for a in np.radians(np.arange(15.0, 360.0, 15.0))]
+    corners = np.concatenate([pointer, *(tick @ turn.T for turn in turns)])
+    height = np.full(len(corners), deck - _ABOVE)
+    faces = np.arange(len(corners)).reshape(-1, 4)
+    marks = mesh(np.column_stack([corners, height]), faces, theme.STEEL)
+    marks.colours[0] = theme.FELT
+    return marks
 
 
 def _cab(platform: Platform, deck: float, radius: float) -> CabParts:

@@ -43,6 +43,8 @@ class Painter:
         sight = self.camera.position - 0.25 * (corners[:, 0] + corners[:, 1] + corners[:, 2] + corners[:, 3])
         seen = np.flatnonzero(np.einsum("fk,fk->f", normals, sight) > 0.0)
         distance = _length(sight[seen])
+        clear = self._fog(distance) < 1.0
+        seen, distance = seen[clear], distance[clear]
         order = np.lexsort((-distance, layer[seen]))
         seen, distance = seen[order], distance[order]
         colours = shaded(mesh.chosen(seen), normals[seen], sight[seen] / distance[:, None])

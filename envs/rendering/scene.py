@@ -37,7 +37,7 @@ _AZIMUTH: Final = np.radians(-134.0)
 _ELEVATION: Final = np.radians(17.0)
 _FIELD: Final = np.radians(30.0)
 """Vertical angle of view."""
-_FOLLOW: Final = 0.87
+_FOLLOW: Final = 0.93
 """Share of the carriage's way the camera goes along; the rest is seen as motion across the picture."""
 _ARROW_LENGTH: Final = 1.1
 """Of the arrow of one g, m."""
