@@ -133,7 +133,7 @@ def cylinder(
 def along(direction: Floats) -> Floats:
     """Rotations (..., 3, 3) that take z to directions (..., 3)."""
     z = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
-    # The helper is the axis least along z, so that the product with it is never near zero.
+    # The second factor starts from the axis least along z, so that the product with it is never near zero.
     x = np.cross(np.eye(3)[np.argmin(np.abs(z), axis=-1)], z)
     x = x / np.linalg.norm(x, axis=-1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=-1)
