@@ -64,7 +64,7 @@ def correlation(a: Floats, b: Floats) -> float:
 
 def steady(trajectory: Trajectory, values: Floats) -> Floats:
     """The last seconds of a signal, in which a steady turn has settled."""
-    return values[trajectory.time > trajectory.time[-1] - SETTLED]
+    return np.asarray(values[trajectory.time > trajectory.time[-1] - SETTLED])
 
 
 def all_checks(drives: Drives) -> list[Check]:
