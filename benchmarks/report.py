@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[1]
 SINGLE_US = 25.0
 SINGLE_RATIO = 25.0
 BATCH_RATIO = 6.0
+PENDULUM_RATIO = 0.5
 STATE_BYTES = 4096.0
 
 
@@ -93,11 +94,14 @@ def targets(rows: list[Row]) -> list[str]:
         "single step, times faster than NumPy": (ratio("step of 1"), SINGLE_RATIO),
         "batch of 1024, times faster than NumPy": (ratio("step of 1024"), BATCH_RATIO),
     }
+    single_environment = {code: row for (case, code), row in by.items() if case == "environment, single"}
+    pendulum = single_environment["Pendulum-v1"].median / single_environment["environment"].median
+    at_least["single environment, times Pendulum-v1's rate"] = (pendulum, PENDULUM_RATIO)
     lines = ["| goal | bound | measured | met |", "|---|---|---|---|"]
     for name, (value, bound) in at_most.items():
         lines.append(f"| {name} | at most {bound:.0f} | {value:.1f} | {yes(value <= bound)} |")
     for name, (value, bound) in at_least.items():
-        lines.append(f"| {name} | at least {bound:.0f} | {value:.1f} | {yes(value >= bound)} |")
+        lines.append(f"| {name} | at least {bound:g} | {value:.1f} | {yes(value >= bound)} |")
     return lines
 
 
