@@ -88,5 +88,5 @@ $(BASE): pyproject.toml constraints.txt | $(BIN)/python
 
 $(DEV): pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing into $(VENV), with the tools of development"
-	@$(PIP) -e '.[dev]'
+	@$(PIP) -e '.[dev,train]'
 	@touch $(BASE) $@
