@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar, get_type_hints
+from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 
 import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -48,12 +48,21 @@ def describe(error: ValidationError, cls: type[Any]) -> str:
 
 
 def _known_fields(cls: type[Any], path: tuple[int | str, ...]) -> list[str]:
-    """Fields of the innermost configuration on the way to ``path``."""
+    """Fields of the innermost configurations on the way to ``path``."""
+    found = [cls]
     for part in path[:-1]:
-        inner = get_type_hints(cls).get(str(part))
-        if isinstance(inner, type) and dataclasses.is_dataclass(inner):
-            cls = inner
-    return [field.name for field in dataclasses.fields(cls)]
+        hints = [get_type_hints(owner).get(str(part)) for owner in found]
+        # Pydantic puts the class of a member of a union into the path.
+        members = [member for member in found if member.__name__ == part]
+        found = [inner for hint in hints for inner in _configurations(hint)] or members or found
+    return list(dict.fromkeys(field.name for owner in found for field in dataclasses.fields(owner)))
+
+
+def _configurations(hint: Any) -> list[type[Any]]:
+    """The configuration classes in a type: itself, or those of its tuple, list or union."""
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return [hint]
+    return [found for inner in get_args(hint) for found in _configurations(inner)]
 
 
 def _describe_one(item: dict[str, Any], known: list[str]) -> str:
@@ -81,12 +90,22 @@ def load(cls: type[T], path: str | Path) -> T:
         ConfigurationError: a field is unknown, missing or out of range.
     """
     try:
-        values = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+        values = yaml.safe_load(text)
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read ({error})") from None
     except yaml.YAMLError as error:
-        raise DataError(f"{path}: not YAML ({str(error).splitlines()[0]})") from None
+        raise DataError(f"{path}: not YAML ({_yaml_problem(error, text)})") from None
     return from_dict(cls, values, str(path))
+
+
+def _yaml_problem(error: yaml.YAMLError, text: str) -> str:
+    """The line, counted from 1, and what is wrong in it."""
+    if isinstance(error, yaml.MarkedYAMLError) and error.problem_mark is not None:
+        return f"line {error.problem_mark.line + 1}: {error.problem}"
+    if isinstance(error, yaml.reader.ReaderError):
+        return f"line {text.count(chr(10), 0, error.position) + 1}: {error.reason}"
+    return str(error).splitlines()[0]
 
 
 def save(config: Any, path: str | Path) -> None:

@@ -6,7 +6,7 @@ import os
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, field
 from pathlib import Path
 from typing import Literal
 
@@ -45,6 +45,25 @@ class Machine:
     offset: Vector3 = (0.0, 0.0, 0.0)
     kind: Literal["hexapod", "table"] = "hexapod"
     spring: Spring = Spring()
+
+
+@dataclass(frozen=True, config=STRICT)
+class Roller:
+    """A configuration that shares a tuple or a union with another."""
+
+    radius: Positive = 1.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Assembly:
+    """Configurations within other types."""
+
+    springs: tuple[Spring, ...] = ()
+    pair: tuple[Spring, Spring] = (Spring(), Spring())
+    listed: list[Spring] = field(default_factory=list)
+    spare: Spring | None = None
+    either: Spring | Roller = Spring()
+    machine: Machine | None = None
 
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -114,6 +133,20 @@ def test_yaml_cannot_make_objects(tmp_path: Path) -> None:
         load(Machine, tmp_path / "machine.yaml")
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("mass: 1\nkind: [table\nspring: {}\n", 3),
+        ("mass: 1\n\n\tkind: table\n", 3),
+        ("mass: 1\nkind: \x01\n", 2),
+    ],
+)
+def test_what_is_not_yaml_is_told_with_its_line(tmp_path: Path, text: str, line: int) -> None:
+    (tmp_path / "machine.yaml").write_text(text)
+    with pytest.raises(DataError, match=rf"machine\.yaml: not YAML \(line {line}: \w"):
+        load(Machine, tmp_path / "machine.yaml")
+
+
 def test_writing_makes_folders_and_replaces(tmp_path: Path) -> None:
     path = tmp_path / "new" / "folder" / "file.txt"
     write_text(path, "one\n")
@@ -170,3 +203,24 @@ def test_an_unknown_field_of_an_inner_configuration_suggests_its_own_fields(tmp_
     path.write_text("mass: 1\nspring: {stifness: 2}")
     with pytest.raises(ConfigurationError, match=r"unknown field 'spring\.stifness'\. Did you mean"):
         load(Machine, path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("springs: [{}, {dampin: 1}]", r"'springs\.1\.dampin'\. Did you mean damping\?"),
+        ("pair: [{}, {dampin: 1}]", r"'pair\.1\.dampin'\. Did you mean damping\?"),
+        ("listed: [{dampin: 1}]", r"'listed\.0\.dampin'\. Did you mean damping\?"),
+        ("spare: {zzz: 1}", r"'spare\.zzz'\. Known: damping, stiffness\."),
+        ("either: {zzz: 1}", r"'either\.Spring\.zzz'\. Known: damping, stiffness\.; .* Known: radius\."),
+        ("machine: {spring: {zzz: 1}}", r"'machine\.spring\.zzz'\. Known: damping, stiffness\."),
+        ("spars: {}", r"'spars'\. Did you mean spare"),
+    ],
+)
+def test_an_unknown_field_within_another_type_suggests_the_inner_fields(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    path = tmp_path / "assembly.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigurationError, match=f"unknown field {message}"):
+        load(Assembly, path)
