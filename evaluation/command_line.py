@@ -126,6 +126,7 @@ def _parse(name: str, arguments: type[Any], rest: list[str]) -> Any:
     import tyro
 
     _refuse_repeated(arguments, rest)
+    _refuse_nothing(arguments, rest)
     complaint = io.StringIO()
     try:
         with redirect_stderr(complaint):
@@ -139,8 +140,9 @@ def _parse(name: str, arguments: type[Any], rest: list[str]) -> Any:
 def _one_line(name: str, panel: str) -> str:
     """The sentences of tyro's framed complaint, with the names of the options it suggests."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", panel)
-    rows = [row.strip("│╭╮╰╯─ ").strip() for row in plain.splitlines()[1:]]
-    text = " ".join(row for row in rows if row).split("For full helptext")[0]
+    rows = [row.strip("│╭╮╰╯─| ") for row in plain.splitlines()[1:]]
+    # Terminals without box characters get rules of ASCII; a `-` within words belongs to an option.
+    text = " ".join(row for row in rows if row.strip("+-")).split("For full helptext")[0]
     told, _, suggested = text.partition("Perhaps you meant:")
     near = dict.fromkeys(re.findall(r"(?<!\S)--[a-z][a-z-]*", suggested))
     hint = f" Did you mean {' or '.join(near)}?" if near else ""
@@ -156,3 +158,16 @@ def _refuse_repeated(arguments: type[Any], rest: list[str]) -> None:
             raise ConfigurationError(
                 f"{flag} is given {times} times; give it once, with all its values after it"
             )
+
+
+def _refuse_nothing(arguments: type[Any], rest: list[str]) -> None:
+    """Tyro takes an option without its names for an empty list, which may be the default."""
+    if "--help" in rest:
+        return
+    for option in dataclasses.fields(arguments):
+        flag = "--" + option.name.replace("_", "-")
+        if not isinstance(option.default, tuple) or flag not in rest:
+            continue
+        after = rest[rest.index(flag) + 1 :]
+        if not after or after[0].startswith("--"):
+            raise ConfigurationError(f"{flag} needs at least one name or file after it")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -84,18 +85,23 @@ class Plan:
 
 @dataclass(eq=False)
 class _Output:
-    """Writes what belongs to one maneuver as soon as it is driven; keeps the figures for the report."""
+    """Writes what belongs to one maneuver as soon as it is driven; keeps the figures for the report.
+
+    Maneuvers and policies are labels with their part of a file name.
+    """
 
     folder: Path
-    policies: list[str]
+    maneuvers: Mapping[str, str]
+    policies: Mapping[str, str]
     figures: dict[str, bytes] = field(default_factory=dict)
 
     def finish(self, maneuver: str, drives: Mapping[str, Trajectory]) -> None:
         """Save trajectories and figure of a maneuver."""
         for policy, drive in drives.items():
-            drive.save(self.folder / "trajectories" / f"{file_name(maneuver)}--{file_name(policy)}.npz")
-        self.figures[maneuver] = maneuver_figure(drives, self.policies)
-        write_bytes(self.folder / f"{file_name(maneuver)}.png", self.figures[maneuver])
+            name = f"{self.maneuvers[maneuver]}--{self.policies[policy]}.npz"
+            drive.save(self.folder / "trajectories" / name)
+        self.figures[maneuver] = maneuver_figure(drives, list(self.policies))
+        write_bytes(self.folder / f"{self.maneuvers[maneuver]}.png", self.figures[maneuver])
 
 
 def run(command: EvaluateCommand) -> int:
@@ -156,7 +162,7 @@ def command_line(command: EvaluateCommand) -> tuple[str, ...]:
 
 def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
     """Drive and measure everything; figures by maneuver come beside the results."""
-    output = _Output(plan.out, list(plan.policies))
+    output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies))
     with _progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
         outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance)
     return collect(plan, outcome), output.figures
@@ -180,9 +186,17 @@ def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
     save_report(results, figures, folder / "report.html")
 
 
-def file_name(label: str) -> str:
-    """A label as part of a file name."""
-    return re.sub(r"[^\w.+-]+", "_", label)
+def file_names(labels: Iterable[str]) -> dict[str, str]:
+    """Each label as part of a file name, no two alike, even where case does not count."""
+    names: dict[str, str] = {}
+    taken: set[str] = set()
+    for label in labels:
+        # A pair of names is joined by `--`: within a name it would make two pairs alike.
+        plain = re.sub(r"--+", "-", re.sub(r"[^\w.+-]+", "_", label)).strip("-") or "_"
+        numbered = (f"{plain}_{number}" for number in count(2))
+        names[label] = next(name for name in chain([plain], numbered) if name.casefold() not in taken)
+        taken.add(names[label].casefold())
+    return names
 
 
 def _drive_with(name: str, platform: Platform, car: Car) -> Drive:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ..envs.cues import CueTrace
-from ..envs.errors import DataError, UnknownNameError
+from ..envs.errors import ConfigurationError, DataError, UnknownNameError
 from ..envs.settings import load
 from .suite import CueSource, labels
 
@@ -85,11 +85,14 @@ def _label(kind: str, name: str, known: Iterable[str]) -> str:
     if name in known:
         return name
     if is_file(name):
-        return Path(_existing(kind, name)).stem
+        file = Path(_existing(kind, name))
+        return file.name.removesuffix(".gz").removesuffix(".csv") if kind == "maneuver" else file.stem
     raise UnknownNameError(kind, name, known)
 
 
 def _existing(kind: str, name: str) -> str:
+    if not name:
+        raise ConfigurationError(f"--{kind}: a name is empty; give a name of `motion-cueing list` or a file")
     if not Path(name).exists():
         raise DataError(f"{kind} {name}: there is no such file")
     return name

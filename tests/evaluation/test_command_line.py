@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import MotionCueingError
 from motion_cueing.evaluation import evaluate_command
 from motion_cueing.evaluation.__main__ import with_default
 from motion_cueing.evaluation.command_line import COMMANDS, main
-from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line
+from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line, file_names
 from motion_cueing.evaluation.results import Results
+from motion_cueing.evaluation.selection import find_maneuvers
 from motion_cueing.evaluation.trajectory import Trajectory
 
 from .synthetic import drive
@@ -119,6 +125,13 @@ def test_a_folder_that_cannot_be_made_is_a_failure(simulator, cue_file, tmp_path
         (["evaluate", "stray"], "stray"),
         (["evaluate", "--policy", "a", "--policy", "b"], "--policy is given 2 times"),
         (["evaluate", "--maneuver"], "--maneuver needs at least one name"),
+        (["evaluate", "--policy"], "--policy needs at least one name"),
+        (["evaluate", "--policy", "--paper"], "--policy needs at least one name"),
+        (["evaluate", "--policy", ""], "--policy: a name is empty"),
+        (["evaluate", "--policy="], "--policy: a name is empty"),
+        (["evaluate", "--maneuver", "hill", ""], "--maneuver: a name is empty"),
+        (["evaluate", "--platform", ""], "--platform: a name is empty"),
+        (["evaluate", "--car", ""], "--car: a name is empty"),
         (["evaluate", "--paper", "--car", "bmw-320i"], "--paper has its own cases"),
         (["evaluate", "--policy", "no-moton"], "unknown policy 'no-moton'. Did you mean no-motion"),
         (
@@ -135,6 +148,47 @@ def test_a_folder_that_cannot_be_made_is_a_failure(simulator, cue_file, tmp_path
 def test_bad_arguments_exit_2_with_one_line(argv, told, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert told in complaint(capsys, argv)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+def test_the_line_holds_nothing_of_a_frame(encoding):
+    code = (
+        "from motion_cueing.evaluation.command_line import main; main(['evaluate', '--polcy', 'no-motion'])"
+    )
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    assert done.stderr == (
+        "motion-cueing evaluate: Unrecognized options: --polcy, no-motion. Did you mean --policy? "
+        "See `motion-cueing evaluate --help`\n"
+    )
+
+
+def test_the_label_of_a_compressed_file_is_its_stem(tmp_path):
+    for name in ("bend.csv.gz", "bend.v2.csv"):
+        write_cues(tmp_path / name)
+        (label,) = find_maneuvers([str(tmp_path / name)], get_car("sedan"))
+        assert label == CueTrace.from_csv(tmp_path / name).name == name.partition(".csv")[0]
+
+
+def test_maneuvers_with_like_names_have_their_own_files(simulator, tmp_path):
+    files = [write_cues(tmp_path / name) for name in ("a b.csv", "a_b.csv", "A b.csv")]
+    out = tmp_path / "out"
+    argv = ["evaluate", "--policy", "classical", "--out", out, "--maneuver", *files]
+    assert main([str(word) for word in argv]) == 0
+    assert {file.name for file in out.glob("*.png")} == {"a_b.png", "a_b_2.png", "A_b_3.png"}
+    driven = {
+        label: Trajectory.load(out / "trajectories" / f"{name}--classical.npz").policy
+        for label, name in file_names(["a b", "a_b", "A b"]).items()
+    }
+    assert list(driven) == ["a b", "a_b", "A b"]
+
+
+@given(st.lists(st.text(), unique=True), st.lists(st.text(), unique=True))
+def test_no_two_drives_share_a_file(maneuvers, policies):
+    first, second = file_names(maneuvers), file_names(policies)
+    pairs = [f"{a}--{b}".casefold() for a in first.values() for b in second.values()]
+    assert len(set(pairs)) == len(maneuvers) * len(policies)
+    assert all(re.fullmatch(r"[\w.+-]+", name) for name in first.values())
 
 
 HEADER = (
