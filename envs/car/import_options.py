@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
 from ..settings import STRICT, NonNegative, Positive, Vector3
@@ -15,12 +16,13 @@ Sign = Literal["estimate", "keep", "flip"]
 class ImportOptions:
     """How a log becomes cues. Angles are in degrees because a person types them."""
 
-    rate_hz: Positive = 100.0
-    """Sample rate of the result, Hz."""
+    rate_hz: Annotated[float, Field(ge=2.0, le=1000.0)] = 100.0
+    """Sample rate of the result, 2 to 1000 Hz: the estimates need signals up to 0.5 Hz, and no device in
+    a car gives more than a thousand samples a second."""
 
     cutoff_hz: Positive = 5.0
     """Cut-off of the zero-phase low-pass on force and rates, Hz. Driving itself ends near 3 Hz;
-    what is above is road, engine and the holder of the device."""
+    what is above is road, engine and the holder of the device. Below half the rate."""
 
     start_s: NonNegative = 0.0
     """What comes earlier in the log is left out, s from its first stamp."""
@@ -64,3 +66,12 @@ class ImportOptions:
 
     speed_delay_s: float | None = None
     """How long the speed lags behind the force; estimated if not given, s."""
+
+    @field_validator("cutoff_hz")
+    @classmethod
+    def _below_half_the_rate(cls, cutoff_hz: float, info: ValidationInfo) -> float:
+        # A rate that is itself wrong is missing here, and is reported on its own.
+        rate_hz = info.data.get("rate_hz")
+        if rate_hz is not None and cutoff_hz >= 0.5 * rate_hz:
+            raise ValueError(f"must be below half of rate_hz, {0.5 * rate_hz:g} Hz")
+        return cutoff_hz

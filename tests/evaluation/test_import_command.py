@@ -89,6 +89,31 @@ def test_bad_input_writes_nothing(log: Path, tmp_path: Path, capsys: pytest.Capt
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--cutoff-hz", "0", "'cutoff_hz': Input should be greater than 0"),
+        ("--cutoff-hz", "nan", "'cutoff_hz': Input should be a finite number"),
+        ("--cutoff-hz", "50", "'cutoff_hz': must be below half of rate_hz, 50 Hz"),
+        ("--rate-hz", "0", "'rate_hz': Input should be greater than or equal to 2"),
+        ("--rate-hz", "1e9", "'rate_hz': Input should be less than or equal to 1000"),
+        ("--rate-hz", "9", "'cutoff_hz': must be below half of rate_hz, 4.5 Hz"),
+        ("--gravity-m-s2", "0", "'gravity_m_s2': Input should be greater than 0"),
+    ],
+)
+def test_a_wrong_option_is_told_in_one_plain_line(
+    option: str, value: str, message: str, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "cues.csv"
+    assert main(["import", str(log), "--column", *TEXTS, "--out", str(out), option, value]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert "pydantic" not in said
+    assert "validation error" not in said
+    assert not out.exists()
+
+
 def test_the_log_is_never_overwritten(log: Path) -> None:
     before = log.read_bytes()
     with pytest.raises(ConfigurationError, match="is the log itself"):
