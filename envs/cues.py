@@ -33,6 +33,9 @@ CSV_COLUMNS: Final = (
 )
 """Columns every cue CSV has; further numeric columns become channels."""
 
+_MOST_SAMPLES: Final = 10_000_000
+"""Of a resampled trace: more than a day at 100 Hz, and about a gigabyte."""
+
 _TIME_TOLERANCE: Final = 1e-3
 """Largest deviation of a time step from the mean step, relative."""
 
@@ -107,13 +110,27 @@ class CueTrace:
     def resampled(self, dt: float) -> CueTrace:
         """The trace at another time step, by linear interpolation between samples.
 
-        A trace that already has this step is returned as it is.
+        A trace that already has this step is returned as it is. Nothing is filtered: before going to a
+        longer step, take out what is above half the new rate, or it folds back into the cues.
+
+        Args:
+            dt: New time step, s.
+
+        Raises:
+            DataError: the step is not positive, or gives fewer than 2 or more than 10 million samples.
         """
         if not dt > 0.0:
             raise DataError(f"{self.name}: time step must be positive, found {dt}")
-        if abs(self.dt - dt) <= 1e-9 * dt:
+        if abs(self.dt / dt - 1.0) <= 1e-9:
             return self
-        time = self.time[0] + dt * np.arange(int(np.floor(self.duration / dt + 1e-9)) + 1)
+        steps = self.duration / dt + 1e-9
+        if not 1.0 <= steps < _MOST_SAMPLES:
+            raise DataError(
+                f"{self.name}: {self.duration:g} s in steps of {dt:g} s gives "
+                f"{'fewer than 2' if steps < 1.0 else 'more than 10 million'} samples; a resampled trace "
+                f"has at least 2 and at most 10 million"
+            )
+        time = self.time[0] + dt * np.arange(int(steps) + 1)
 
         def at(values: Floats) -> Floats:
             columns = [np.interp(time, self.time, column) for column in np.atleast_2d(values.T)]
@@ -169,14 +186,18 @@ class CueTrace:
                 f"{path}: missing column {', '.join(missing)}; found {', '.join(table)}. "
                 "`motion-cueing import` converts a log with other columns"
             )
-        return cls(
-            name=name or Path(path).name.removesuffix(".gz").removesuffix(".csv"),
-            time=table[CSV_COLUMNS[0]],
-            specific_force=np.stack([table[column] for column in CSV_COLUMNS[1:4]], axis=1),
-            angular_velocity=np.stack([table[column] for column in CSV_COLUMNS[4:7]], axis=1),
-            channels={key: value for key, value in table.items() if key not in CSV_COLUMNS},
-            source=str(path),
-        )
+        name = name or Path(path).name.removesuffix(".gz").removesuffix(".csv")
+        try:
+            return cls(
+                name=name,
+                time=table[CSV_COLUMNS[0]],
+                specific_force=np.stack([table[column] for column in CSV_COLUMNS[1:4]], axis=1),
+                angular_velocity=np.stack([table[column] for column in CSV_COLUMNS[4:7]], axis=1),
+                channels={key: value for key, value in table.items() if key not in CSV_COLUMNS},
+                source=str(path),
+            )
+        except DataError as error:
+            raise DataError(f"{path}: {str(error).removeprefix(f'{name}: ')}") from None
 
 
 def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, Floats]:

@@ -149,8 +149,15 @@ def test_resampling_needs_a_positive_step(step: float) -> None:
 
 
 def test_resampling_to_less_than_two_samples() -> None:
-    with pytest.raises(DataError, match="at least 2"):
-        CueTrace(**fields()).resampled(10.0)
+    for step in (10.0, float("inf")):
+        with pytest.raises(DataError, match=r"drive: 0\.4 s in steps of .* fewer than 2 samples"):
+            CueTrace(**fields()).resampled(step)
+
+
+@pytest.mark.parametrize("step", [4e-8 / 1.0001, 1e-300, 5e-324])
+def test_resampling_to_more_samples_than_memory_holds(step: float) -> None:
+    with pytest.raises(DataError, match=r"drive: 0\.4 s in steps of .* more than 10 million samples"):
+        CueTrace(**fields()).resampled(step)
 
 
 @settings(max_examples=30, deadline=None)
@@ -212,8 +219,9 @@ NEXT = "0.01,0,0,-9.81,0,0,0"
 def test_bad_csv(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.csv"
     path.write_text(text)
-    with pytest.raises(DataError, match=message):
+    with pytest.raises(DataError, match=message) as caught:
         CueTrace.from_csv(path)
+    assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_unreadable_files(tmp_path: Path) -> None:
