@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import ast
+import re
+import shutil
 import subprocess
 import sys
 import sysconfig
 import venv
 import zipfile
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
 
 from .repository import PACKAGES, ROOT, package_files
 
+LOADERS = ("find_spec", "import_module", "load")
+"""Functions whose first argument, where it is text, names a module."""
+COMPANIONS = {"cycler": "matplotlib"}
+"""What a dependency brings with it and hands out as part of its own interface."""
 METADATA = ("pyproject.toml", "README.md", "LICENSE")
 
 
@@ -88,6 +98,13 @@ def test_the_command_works_where_only_the_wheel_is(installed, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_the_command_evaluates_where_only_the_wheel_is(installed, tmp_path):
+    words = ("evaluate", "--maneuver", "lane-change", "--policy", "no-motion", "--out", "out")
+    assert "lane-change" in run(installed / "motion-cueing", *words, cwd=tmp_path)
+    assert (tmp_path / "out" / "report.html").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
 def test_the_namespace_is_imported_from_the_wheel(installed, tmp_path):
     code = (
         "import motion_cueing.baselines, motion_cueing.evaluation, motion_cueing.train\n"
@@ -110,3 +127,97 @@ def test_importing_needs_no_heavy_library(package, tmp_path):
         "print([name for name in ('torch', 'matplotlib', 'jinja2', 'tyro') if name in sys.modules])"
     )
     assert run(sys.executable, "-c", code, cwd=tmp_path).strip() == "[]"
+
+
+@cache
+def distributions() -> Mapping[str, list[str]]:
+    """Distributions by the module they install; slow to find."""
+    return packages_distributions()
+
+
+def canonical(distribution: str) -> str:
+    """A name as package indexes compare it."""
+    return re.sub(r"[-_.]+", "-", distribution).lower()
+
+
+def requirements(wheel: Path) -> dict[str, set[str]]:
+    """Distributions by extra, as the wheel declares them; those always installed under an empty name."""
+    archive = zipfile.ZipFile(wheel)
+    (metadata,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+    found: dict[str, set[str]] = {}
+    for line in re.findall(r"(?m)^Requires-Dist: (.+)$", archive.read(metadata).decode()):
+        extra = re.search(r"extra == ['\"](\w+)['\"]", line)
+        name = re.match(r"[\w.-]+", line)
+        found.setdefault(extra[1] if extra else "", set()).add(canonical(name[0]))
+    return found
+
+
+def imports(node: ast.AST, deferred: bool = False) -> Iterator[tuple[str, bool]]:
+    """Modules of other projects, each with whether it waits for a call or serves only type checkers."""
+    names: list[str] = []
+    if isinstance(node, ast.Import):
+        names = [alias.name for alias in node.names]
+    elif isinstance(node, ast.ImportFrom) and node.level == 0:
+        names = [node.module]
+    elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+        called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        names = [node.args[0].value] if called in LOADERS and isinstance(node.args[0].value, str) else []
+    roots = {name.split(".")[0] for name in names} - {"", "motion_cueing", *sys.stdlib_module_names}
+    yield from ((root, deferred) for root in roots)
+    typing_only = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    within = deferred or typing_only or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+    for child in ast.iter_child_nodes(node):
+        yield from imports(child, within)
+
+
+def undeclared(path: Path, text: str, declared: dict[str, set[str]]) -> list[str]:
+    """Imports of a file that nobody is told to install for it."""
+    extras = {"train"} if path.parts[0] == "train" else set()
+    wrong = []
+    for name, deferred in imports(ast.parse(text)):
+        usable = {"", *extras, *(declared.keys() - {"dev"} if deferred else ())}
+        allowed = set().union(*(declared[extra] for extra in usable))
+        found = {canonical(owner) for owner in distributions().get(COMPANIONS.get(name, name), [])}
+        if not found & allowed:
+            wrong.append(f"{path.as_posix()}: {name}")
+    return wrong
+
+
+def test_every_import_belongs_to_a_declared_dependency(wheel):
+    declared = requirements(wheel)
+    assert declared.keys() == {"", "dev", "render", "train"}
+    sources = [path for path in package_files() if path.suffix == ".py"]
+    found = [
+        line for path in sources for line in undeclared(path, (ROOT / path).read_text("utf-8"), declared)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "wrong"),
+    [
+        ("envs/a.py", "import numpy.linalg\nfrom .b import c\nimport json", False),
+        ("envs/a.py", "import torch", True),
+        ("envs/a.py", "class A:\n    import torch", True),
+        ("envs/a.py", "def f():\n    import torch", False),
+        ("envs/a.py", "def f():\n    from hypothesis import given", True),
+        ("envs/a.py", "import pygame", True),
+        ("envs/a.py", "def f():\n    load('pygame', 'pygame-ce')", False),
+        ("envs/a.py", "import_module('pygame.draw')", True),
+        ("train/a.py", "from torch import nn", False),
+        ("train/a.py", "import pygame", True),
+        ("train/a.py", "import no_such_module_anywhere", True),
+    ],
+)
+def test_what_counts_as_declared(wheel, path, text, wrong):
+    assert bool(undeclared(Path(path), text, requirements(wheel))) == wrong
+
+
+def test_every_folder_of_the_packages_is_tracked():
+    """A folder that git ignores is there for whoever wrote it, and for nobody else."""
+    listed = re.search(r"(?s)\npackages = \[(.+?)\n\]", (ROOT / "pyproject.toml").read_text("utf-8"))
+    folders = [name.replace(".", "/") for name in re.findall(r'"motion_cueing\.([\w.]+)"', listed[1])]
+    assert set(PACKAGES) <= set(folders)
+    if shutil.which("git") and (ROOT / ".git").exists():
+        tracked = set(run("git", "ls-files", "--", *folders, cwd=ROOT).splitlines())
+        assert [folder for folder in folders if f"{folder}/__init__.py" not in tracked] == []
