@@ -8,7 +8,8 @@ import pytest
 from motion_cueing.envs.car import car_names, get_car, get_maneuver, maneuver_names
 from motion_cueing.envs.car.cone_maneuvers import DoubleLaneChange, ObstacleAvoidance, Slalom
 from motion_cueing.envs.car.corridors import Gate, clearance, smoothest_way
-from motion_cueing.envs.car.maneuver import DEGREE, KMH
+from motion_cueing.envs.car.maneuver import DEGREE, KMH, LARGEST_OFFSET, Maneuver
+from motion_cueing.envs.car.paper_maneuvers import SteadyTurn
 from motion_cueing.envs.car.steering_tests import SineWithDwell
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
@@ -96,6 +97,26 @@ def test_way_too_narrow_for_the_car_is_refused():
     car = get_car("sedan")
     with pytest.raises(ConfigurationError, match="does not fit"):
         smoothest_way([Gate.lane(20.0, 20.0, 0.0, 1.8)], car, 10.0, 80.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("maneuver", "asked"),
+    [
+        (SteadyTurn(radius=5.0), "steady-turn with .*radius 5,"),
+        (Slalom(spacing=6.0), "slalom with .*spacing 6,"),
+        (DoubleLaneChange(speed=60.0), "double-lane-change with .*speed 60,"),
+    ],
+    ids=lambda value: value.name if isinstance(value, Maneuver) else "",
+)
+def test_a_maneuver_no_car_can_drive_is_refused(maneuver, asked):
+    with pytest.raises(
+        ConfigurationError, match=rf"sedan cannot drive {asked}.* came \d+\.\d m off its path"
+    ):
+        maneuver.drive()
+
+
+def test_open_loop_steering_has_no_path_to_come_off(drives):
+    assert np.abs(drives["step-steer", "sedan"].channels["path_offset_m"]).max() > LARGEST_OFFSET
 
 
 def test_steady_turn_of_the_paper(drives):
