@@ -10,7 +10,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ..cues import CueTrace
-from ..errors import UnknownNameError
+from ..errors import ConfigurationError, UnknownNameError
 from ..settings import STRICT, NonNegative
 from .fleet import car_names, get_car
 from .paths import STEP, Path
@@ -23,6 +23,12 @@ Floats = NDArray[np.float64]
 
 SETTLE: Final = 3.0
 """Straight and steady driving before the first event, s."""
+
+SHORTEST: Final = 0.1
+"""Of a drive, s: ten samples."""
+
+LONGEST: Final = 86_400.0
+"""Of a drive, s: a day, some gigabyte of cues."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -55,7 +61,15 @@ class RandomDrives:
         return np.asarray(weights / weights.sum())
 
     def plan(self, seed: int, duration: float, kind: str | None = None, car: Car | None = None) -> Plan:
-        """The drive that belongs to ``seed``; kind of road and car are drawn unless given."""
+        """The drive that belongs to ``seed``; kind of road and car are drawn unless given.
+
+        Raises:
+            ConfigurationError: the seed or the duration is out of range.
+            UnknownNameError: no such kind of road.
+        """
+        _check_seed(seed)
+        if not SHORTEST <= duration <= LONGEST:
+            raise ConfigurationError(f"duration is {duration:g} s; use {SHORTEST:g} to {LONGEST:g} s")
         rng = np.random.default_rng(seed)
         drawn_kind, drawn_car = str(rng.choice(list(KINDS), p=self.shares)), str(rng.choice(self.cars))
         kind = drawn_kind if kind is None else kind
@@ -75,12 +89,13 @@ def random_drive(
 
     Args:
         seed: The same seed gives the same drive.
-        duration: s.
+        duration: 0.1 s to a day, s.
         kind: "urban", "rural" or "highway"; drawn if None.
         car: Drawn from ``drives.cars`` if None.
         drives: What to draw from.
 
     Raises:
+        ConfigurationError: the seed or the duration is out of range.
         UnknownNameError: no such kind of road.
     """
     return simulate([(drives or RandomDrives()).plan(seed, duration, kind, car)])[0]
@@ -88,7 +103,13 @@ def random_drive(
 
 def drive_seeds(n: int, seed: int) -> list[int]:
     """The seeds of the ``n`` drives of a batch: well apart for any two values of ``seed``."""
+    _check_seed(seed)
     return [int(s) for s in np.random.SeedSequence(seed).generate_state(n, np.uint32)]
+
+
+def _check_seed(seed: int) -> None:
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise ConfigurationError(f"seed is {seed!r}; use a whole number from 0 up")
 
 
 def random_drives(

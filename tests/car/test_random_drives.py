@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from motion_cueing.envs.car import RandomDrives, drive_seeds, get_car, random_drive, random_drives
 from motion_cueing.envs.cues import GRAVITY
-from motion_cueing.envs.errors import UnknownNameError
+from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 
 KINDS = ("urban", "rural", "highway")
 
@@ -108,3 +108,21 @@ def test_bad_settings_are_refused():
         RandomDrives(urban=0, rural=0, highway=0)
     with pytest.raises(ValidationError):
         RandomDrives(urban=float("nan"))
+
+
+@pytest.mark.parametrize("duration", [-5.0, 0.0, 0.001, float("nan"), float("inf"), 1e9])
+def test_a_duration_out_of_range_is_refused(duration):
+    with pytest.raises(ConfigurationError, match="duration is"):
+        random_drive(0, duration)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, None])
+def test_a_seed_that_is_no_whole_number_is_refused(seed):
+    with pytest.raises(ConfigurationError, match="seed is"):
+        random_drive(seed, 5.0)
+    with pytest.raises(ConfigurationError, match="seed is"):
+        random_drives(2, 5.0, seed)
+
+
+def test_the_shortest_drive():
+    assert random_drive(0, 0.1).duration == pytest.approx(0.1)
