@@ -14,16 +14,19 @@ from .errors import ActionError, ConfigurationError, DataError
 from .mirror import Mirror
 from .perception.filters import Vestibular, vestibular_parameters
 from .perception.models import VestibularModel, get_vestibular_model
-from .platform.kinematics import legs_of_pose
+from .platform.kinematics import legs_of_pose, pose_of_legs
 from .platform.machines import Platform
 from .platform.parameters import dead_steps, machine_parameters
-from .platform.state import Machine, SetPoint
+from .platform.state import ACTUATORS, Machine, SetPoint
 from .precision import FLOAT, real, vec3, vec9
 from .state import Drives, State
 from .step import reset_forward, step_forward
 
 TIME_STEP: Final = 0.01
 """Time step of the machine and its policies, s."""
+
+_SAME_POSE: Final = 1e-4
+"""Largest difference of two poses taken for one, m and rad."""
 
 N_AXES: Final = 9
 """Degrees of freedom of an action."""
@@ -64,6 +67,8 @@ class Simulator:
         self.drives = [drives] if isinstance(drives, CueTrace) else list(drives)
         if not self.platforms or not self.drives:
             raise ConfigurationError("platforms and drives must each name at least one")
+        if not (np.isfinite(dt) and dt > 0.0):
+            raise ConfigurationError(f"dt must be a positive time step in seconds, found {dt}")
         self.dt = dt
         self.device = wp.get_device(device)
         self.drive_of = _indices("drive_of", drive_of, np.arange(len(self.drives)), len(self.drives))
@@ -185,6 +190,9 @@ class Simulator:
         """
         poses = _finite("start", np.zeros(N_AXES) if start is None else start, (self.n, N_AXES))
         samples = np.broadcast_to(0 if sample is None else np.asarray(sample, dtype=np.int32), (self.n,))
+        lengths = np.array([len(drive) for drive in self.drives])[self.drive_of]
+        if np.any((samples < 0) | (samples >= lengths)):
+            raise DataError(f"sample must be 0 to the last of each drive ({lengths - 1}), found {samples}")
         chosen = np.broadcast_to(True if mask is None else np.asarray(mask, dtype=bool), (self.n,))
         self._check_start(poses, chosen)
         self.place(chosen, sample=samples, start=poses)
@@ -222,11 +230,17 @@ class Simulator:
         moved = np.flatnonzero(chosen & np.any(poses != 0.0, axis=1))
         for i in moved:
             machine = limits[self.platform_of[i]]
-            legs = legs_of_pose(self.platforms[self.platform_of[i]].hexapod, poses[i, 2:8])
+            hexapod = self.platforms[self.platform_of[i]].hexapod
+            legs = legs_of_pose(hexapod, poses[i, 2:8])
             position = np.concatenate([poses[i, :2], legs, poses[i, 8:]])
             if np.any(position < machine["position_min"]) or np.any(position > machine["position_max"]):
                 name = self.platforms[self.platform_of[i]].name
-                raise DataError(f"start pose {i} lies outside the travel of {name}: {poses[i]}")
+                outside = (position < machine["position_min"]) | (position > machine["position_max"])
+                which = ACTUATORS[int(np.argmax(outside))]
+                raise DataError(f"start pose {i} lies outside the travel of {name}, {which}: {poses[i]}")
+            # The same legs may close on the other side of a singular pose, which no motion reaches.
+            if not np.allclose(pose_of_legs(hexapod, legs), poses[i, 2:8], atol=_SAME_POSE):
+                raise DataError(f"start pose {i} cannot be reached from neutral: {poses[i]}")
 
     def step(self, action: ArrayLike) -> NDArray[Any]:
         """Advance every environment by one time step.

@@ -19,7 +19,7 @@ from .state import Cues, Drives, State
 @wp.func
 def wanted_cues(m: Machine, drives: Drives, drive: int, sample: int) -> Cues:
     """The car's cues at a sample of a drive (the last one after its end), the head as in the machine."""
-    i = drives.first[drive] + wp.min(sample, drives.length[drive] - 1)
+    i = drives.first[drive] + wp.clamp(sample, 0, drives.length[drive] - 1)
     cues = Cues()
     cues.force = drives.force[i]
     cues.rate = drives.rate[i]

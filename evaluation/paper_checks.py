@@ -89,11 +89,11 @@ def within_limits(case: str, t: Trajectory) -> Check:
 def entry_and_turn(t: Trajectory) -> list[Check]:
     """EST1: side force, onset, dip, steady value, washed-out yaw rate."""
     first = beginning(t)
-    onset = slice(first, first + round(ONSET_WINDOW / 0.01))
+    onset = slice(first, first + round(ONSET_WINDOW / t.dt))
     felt, wanted = t.f_felt[:, 1], t.f_wanted[:, 1]
     cue = float(felt[onset].max())
     at = first + int(np.argmax(felt[onset]))
-    dip = float(felt[at : at + round(4.0 / 0.01)].min())
+    dip = float(felt[at : at + round(4.0 / t.dt)].min())
     end = float(steady(t, felt).mean())
     rapid = float(t.time[at] - t.time[first])
     yaw = float(steady(t, t.w_felt[:, 2]).mean() / steady(t, t.w_wanted[:, 2]).mean())
@@ -101,7 +101,7 @@ def entry_and_turn(t: Trajectory) -> list[Check]:
         Check("EST1", "peak side force in the car", "about 0.25 g", float(wanted.max()) / GRAVITY, "g", 0.23, 0.27),
         Check("EST1", "onset cue: time to its peak", "rapid onset", rapid, "s", 0.0, 1.0),
         Check("EST1", "onset cue over the car's peak", "below the car's", cue / float(wanted.max()), "", 0.6, 0.99),
-        Check("EST1", "dip after the onset, below the steady value", "a small dip", (end - dip) / end, "", 0.05, 0.5),
+        Check("EST1", "dip after the onset, below the steady value", "a small dip", (end - dip) / end, "", 0.05, 0.35),
         Check(
             "EST1", "steady side force over the car's", "the right steady value",
             end / float(steady(t, wanted).mean()), "", 0.95, 1.05,
@@ -144,7 +144,7 @@ def without_turntable(est1: Trajectory, t: Trajectory) -> list[Check]:
     """EST3: mainly lateral carriage travel, a very short yaw cue, side force as EST1."""
     travel = np.ptp(t.carriage, axis=0)
     yaw = t.w_felt[:, 2]
-    short = float(np.count_nonzero(yaw > 0.5 * yaw.max()) * 0.01)
+    short = float(np.count_nonzero(yaw > 0.5 * yaw.max()) * t.dt)
     difference = float(np.sqrt(np.mean((t.f_felt[:, 1] - est1.f_felt[:, 1]) ** 2)))
     return [
         Check("EST3", "carriage travel along over across", "primarily lateral", float(travel[0] / travel[1]), "", 0.0, 0.25),
@@ -160,11 +160,11 @@ def braking(t: Trajectory) -> list[Check]:
     first = beginning(t)
     felt, wanted = t.f_felt[:, 0], t.f_wanted[:, 0]
     stop = first + int(np.argmax(wanted[first:] > -0.1))
-    onset = float(felt[first : first + round(ONSET_WINDOW / 0.01)].min())
-    sag = float(felt[first + round(ONSET_WINDOW / 0.01) : stop].max())
-    around = slice(stop - 60, stop + 60)
+    onset = float(felt[first : first + round(ONSET_WINDOW / t.dt)].min())
+    sag = float(felt[first + round(ONSET_WINDOW / t.dt) : stop].max())
+    around = slice(stop - round(0.6 / t.dt), stop + round(0.6 / t.dt))
     transient = float(np.ptp(felt[around]) / np.ptp(wanted[around]))
-    false_cue = float(-felt[stop + round(1.0 / 0.01) :].min() / GRAVITY)
+    false_cue = float(-felt[stop + round(1.0 / t.dt) :].min() / GRAVITY)
     travel = float(np.ptp(t.carriage[:, 0]))
     reach = float(np.abs(t.carriage).max())
     plateau = float(np.median(wanted[first:stop]))

@@ -65,7 +65,7 @@ def _trajectories(drives: Drives) -> Figure:
     for axes, name in zip(figure.subplots(1, 3, sharex=True, sharey=True), _TURNS, strict=True):
         t = drives[name]
         axes.plot(t.carriage[:, 1], t.carriage[:, 0])
-        every = np.arange(0, len(t.time), round(_ARROW_EVERY / 0.01))
+        every = np.arange(0, len(t.time), round(_ARROW_EVERY / t.dt))
         heading = t.turntable[every] + t.hexapod[every, 5]
         axes.quiver(
             t.carriage[every, 1], t.carriage[every, 0], np.sin(heading), np.cos(heading),

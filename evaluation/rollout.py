@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..baselines.policy import Policy, start_of
 from ..envs.car import Car
 from ..envs.cues import CueTrace
-from ..envs.errors import ActionError
+from ..envs.errors import ActionError, ConfigurationError
 from ..envs.observation import OBSERVATION_SIZE, observe_forward
 from ..envs.perception import VestibularModel
 from ..envs.platform import Platform, actuator_limits, get_platform
@@ -68,8 +68,19 @@ def rollout(
         on_step: Called with the steps done and the steps in all.
 
     Raises:
-        ActionError: the policy returned something that is not nine finite numbers.
+        ActionError: the policy returned something that is not nine finite numbers and a state.
+        ConfigurationError: an argument is of the wrong type, or the policy was made for another time step.
     """
+    if not isinstance(cues, CueTrace):
+        raise ConfigurationError(
+            f"cues must be a CueTrace, found {type(cues).__name__}; get_maneuver(name).drive()"
+        )
+    if platform is not None and not isinstance(platform, Platform):
+        raise ConfigurationError(
+            f"platform must be a Platform, found {type(platform).__name__}; get_platform(name)"
+        )
+    if getattr(policy, "dt", dt) != dt:
+        raise ConfigurationError(f"the policy's time step is {policy.dt} s, the rollout's {dt} s")  # type: ignore[attr-defined]
     platform = platform or get_platform("paper")
     cues = cues.resampled(dt)
     simulator = Simulator(platform, cues, vestibular=vestibular, dt=dt)
@@ -91,8 +102,9 @@ def _drive(
     for k in range(1, n):
         observation = observe()
         began = time.perf_counter()
-        action, memory = policy.predict(observation, memory, begins, deterministic=True)
+        answer = policy.predict(observation, memory, begins, deterministic=True)
         seconds[k] = time.perf_counter() - began
+        action, memory = _pair(answer, k)
         begins = np.zeros(1, dtype=bool)
         actions[k] = _one(action, k)
         states[k] = simulator.step(actions[k])[0]
@@ -101,8 +113,19 @@ def _drive(
     return states, actions, seconds
 
 
+def _pair(answer: Any, k: int) -> tuple[Any, Any]:
+    if not isinstance(answer, tuple) or len(answer) != 2:
+        raise ActionError(
+            f"predict must return (action, state); at step {k} it returned {type(answer).__name__}"
+        )
+    return answer
+
+
 def _one(action: Any, k: int) -> NDArray[np.float64]:
-    values = np.asarray(action, dtype=np.float64)
+    try:
+        values = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ActionError(f"the policy's action at step {k} is not made of numbers") from None
     if values.shape not in ((1, N_AXES), (N_AXES,)):
         raise ActionError(f"the policy's action at step {k} has shape {values.shape}, expected (1, {N_AXES})")
     return values.reshape(N_AXES)

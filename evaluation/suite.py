@@ -68,12 +68,30 @@ def run_suite(
             outcome.failures.append(Failure(maneuver, None, explain(error)))
             continue
         drives = _drive_all(maneuver, cues, policies, progress, outcome)
-        outcome.maneuvers[maneuver] = {name: measure(drive, criteria) for name, drive in drives.items()}
+        measured = _measure_all(maneuver, drives, criteria, outcome)
+        outcome.maneuvers[maneuver] = measured
+        drives = {name: drives[name] for name in measured}
         for name, drive in drives.items():
             outcome.metadata.setdefault(name, dict(drive.metadata))
         if drives:
-            finish(maneuver, drives)
+            try:
+                finish(maneuver, drives)
+            except Exception as error:
+                outcome.failures.append(Failure(maneuver, None, explain(error)))
     return outcome
+
+
+def _measure_all(
+    maneuver: str, drives: Mapping[str, Trajectory], criteria: Criteria | None, outcome: Outcome
+) -> dict[str, Metrics]:
+    measured: dict[str, Metrics] = {}
+    for name, drive in drives.items():
+        # Metrics are finite numbers; a drive beyond all bounds has none, and must not cost the others.
+        try:
+            measured[name] = measure(drive, criteria)
+        except Exception as error:
+            outcome.failures.append(Failure(maneuver, name, explain(error)))
+    return measured
 
 
 def _drive_all(

@@ -21,8 +21,6 @@ from .repository import PACKAGES, ROOT, package_files
 
 LOADERS = ("find_spec", "import_module", "load")
 """Functions whose first argument, where it is text, names a module."""
-COMPANIONS = {"cycler": "matplotlib"}
-"""What a dependency brings with it and hands out as part of its own interface."""
 METADATA = ("pyproject.toml", "README.md", "LICENSE")
 
 
@@ -177,7 +175,7 @@ def undeclared(path: Path, text: str, declared: dict[str, set[str]]) -> list[str
     for name, deferred in imports(ast.parse(text)):
         usable = {"", *extras, *(declared.keys() - {"dev"} if deferred else ())}
         allowed = set().union(*(declared[extra] for extra in usable))
-        found = {canonical(owner) for owner in distributions().get(COMPANIONS.get(name, name), [])}
+        found = {canonical(owner) for owner in distributions().get(name, [])}
         if not found & allowed:
             wrong.append(f"{path.as_posix()}: {name}")
     return wrong

@@ -215,3 +215,16 @@ def test_memory_of_an_environment_is_small():
     batch = Simulator(PLATFORMS[0], DRIVES[1])
     # Both copies, the command and the delay line of a machine without dead time.
     assert 2 * batch.state.itemsize + 9 * 8 <= 4096
+
+
+@pytest.mark.parametrize("sample", [-1, -1_000_000_000, 10_000_000])
+def test_a_sample_outside_the_drive_is_refused(sample):
+    batch = Simulator(PLATFORMS[0], DRIVES[:2], drive_of=[1])
+    with pytest.raises(DataError, match="sample must be"):
+        batch.reset(sample=[sample])
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.01, np.nan])
+def test_a_time_step_must_be_positive(dt):
+    with pytest.raises(ConfigurationError, match="dt must be"):
+        Simulator(PLATFORMS[0], DRIVES[0], dt=dt)

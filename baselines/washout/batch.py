@@ -58,6 +58,8 @@ class WashoutBatch:
     def __init__(
         self, sets: Sequence[WashoutParameters], drives: Sequence[CueTrace], platform: Platform
     ) -> None:
+        if not sets or not drives:
+            raise ConfigurationError("a washout batch needs at least one parameter set and one drive")
         self.shape = len(sets), len(drives)
         drive_of = np.tile(np.arange(len(drives)), len(sets))
         self.simulator = Simulator(platform, drives, drive_of=drive_of, dt=drives[0].dt)
@@ -77,6 +79,8 @@ class WashoutBatch:
             cost: What J measures.
             threads: Launches side by side; a launch on the CPU uses one core and lets others run.
         """
+        if threads < 1:
+            raise ConfigurationError(f"threads must be at least 1, found {threads}")
         simulator, n = self.simulator, self.simulator.n
         score = wp.zeros(n, dtype=Score)
         bounds = np.linspace(0, n, min(threads, n) + 1).astype(int)

@@ -10,8 +10,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from ...envs.errors import UnknownNameError
-from ...envs.settings import STRICT, NonNegative, Positive, Vector2, Vector3, load
+from ...envs.settings import STRICT, Positive, Vector2, Vector3, load
 
+Frequency = Annotated[float, Field(ge=0.0, le=100.0)]
+Limits = tuple[Positive, Positive, Positive]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -26,7 +28,7 @@ class HighPass:
     """
 
     order: Literal[0, 1, 2] = 0
-    frequency: NonNegative = 0.0
+    frequency: Frequency = 0.0
     damping: Positive = 1.0
 
 
@@ -37,7 +39,7 @@ OPEN: Final = HighPass()
 class LowPass:
     """w^2 / (s^2 + 2 zeta w s + w^2): break frequency w, rad/s, and damping zeta."""
 
-    frequency: Positive
+    frequency: Annotated[float, Field(gt=0.0, le=100.0)]
     damping: Positive = 1.0
 
 
@@ -55,7 +57,7 @@ class TiltCoordination:
     low_pass: LowPass = LowPass(5.0)
     rate: Positive = math.radians(3.0)
     acceleration: Positive = math.radians(8.0)
-    approach: Positive = 10.0
+    approach: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -86,11 +88,11 @@ class WashoutParameters:
     name: str
     description: str = ""
     force_scale: Vector3 = (1.0, 1.0, 1.0)
-    force_limit: Vector3 = (10.0, 10.0, 10.0)
+    force_limit: Limits = (10.0, 10.0, 10.0)
     rate_scale: Vector3 = (1.0, 1.0, 1.0)
-    rate_limit: Vector3 = (1.5, 1.5, 1.5)
+    rate_limit: Limits = (1.5, 1.5, 1.5)
     hpr: tuple[HighPass, HighPass, HighPass] = (HighPass(2, 0.5), HighPass(2, 0.5), HighPass(1, 0.2))
-    rate_bandwidth: Positive = 50.0
+    rate_bandwidth: Annotated[float, Field(gt=0.0, le=200.0)] = 50.0
     tilt: TiltCoordination | None = TiltCoordination()
     turntable_share: Share = 1.0
     turntable_gain: Positive = 1.0
@@ -99,7 +101,7 @@ class WashoutParameters:
     lpc: LowPass | None = LowPass(3.0)
     start_carriage: Vector2 = (0.0, 0.0)
     start_hexapod: Vector3 = (0.0, 0.0, 0.0)
-    follow_frequency: Positive = 5.0
+    follow_frequency: Annotated[float, Field(gt=0.0, le=50.0)] = 5.0
 
 
 _PRESETS: Final = Path(__file__).parent / "presets"

@@ -81,6 +81,8 @@ class Memory:
     velocity: vec3
     carriage: vec2  # C'
     carriage_rate: vec2
+    psi_t_start: real  # where the turntable stood when the episode began
+    psi_h_start: real  # the same of the hexapod's yaw
 
 
 @wp.struct
@@ -167,7 +169,7 @@ def split(p: Parameters, m: Memory, beta_hp_acceleration: vec3, tilt: vec2) -> R
     k_t = p.turntable_share
     k_h = real(1.0) - k_t
     r = Rotation()
-    r.beta = vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], k_h * m.beta_hp[2])
+    r.beta = vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], m.psi_h_start + k_h * m.beta_hp[2])
     r.beta_rate = vec3(
         m.beta_hp_rate[0] + m.tilt_rate[0], m.beta_hp_rate[1] + m.tilt_rate[1], k_h * m.beta_hp_rate[2]
     )
@@ -175,7 +177,7 @@ def split(p: Parameters, m: Memory, beta_hp_acceleration: vec3, tilt: vec2) -> R
         beta_hp_acceleration[0] + tilt[0], beta_hp_acceleration[1] + tilt[1], k_h * beta_hp_acceleration[2]
     )
     gain = k_t * p.turntable_gain
-    r.psi_t = gain * m.beta_hp[2]
+    r.psi_t = m.psi_t_start + gain * m.beta_hp[2]
     r.psi_t_rate = gain * m.beta_hp_rate[2]
     r.psi_t_acceleration = gain * beta_hp_acceleration[2]
     return r
@@ -317,6 +319,8 @@ def led_back(p: Parameters, m: Memory, seen: Reading, r: Rotation, after: Memory
     b_rate = seen.beta_rate - r.beta_rate
     turned = wrapped(seen.psi_t - r.psi_t) / p.turntable_gain
     turned_rate = (seen.psi_t_rate - r.psi_t_rate) / p.turntable_gain
+    yaw = (real(1.0) - p.turntable_share) * b[2] + p.turntable_share * turned
+    yaw_rate = (real(1.0) - p.turntable_share) * b_rate[2] + p.turntable_share * turned_rate
     zero = real(0.0)
     out = after
     out.carriage = after.carriage + k * c * p.carriage_share
@@ -325,8 +329,8 @@ def led_back(p: Parameters, m: Memory, seen: Reading, r: Rotation, after: Memory
     out.velocity = after.velocity + k * moved_rate
     out.tilt = after.tilt + k * vec2(b[0], b[1])
     out.tilt_rate = after.tilt_rate + k * vec2(b_rate[0], b_rate[1])
-    out.beta_hp = after.beta_hp + k * vec3(zero, zero, b[2] + turned)
-    out.beta_hp_rate = after.beta_hp_rate + k * vec3(zero, zero, b_rate[2] + turned_rate)
+    out.beta_hp = after.beta_hp + k * vec3(zero, zero, yaw)
+    out.beta_hp_rate = after.beta_hp_rate + k * vec3(zero, zero, yaw_rate)
     return out
 
 
@@ -337,10 +341,8 @@ def initial_memory(p: Parameters, seen: Reading) -> Memory:
     m.carriage = seen.carriage * p.carriage_share
     m.displacement = seen.displacement + vec3(m.carriage[0], m.carriage[1], real(0.0))
     m.tilt = vec2(seen.beta[0], seen.beta[1])
-    yaw = seen.beta[2]
-    if p.turntable_share > real(0.0):
-        yaw = seen.psi_t / (p.turntable_share * p.turntable_gain)
-    m.beta_hp = vec3(real(0.0), real(0.0), yaw)
+    m.psi_t_start = seen.psi_t
+    m.psi_h_start = seen.beta[2]
     return m
 
 
@@ -350,12 +352,15 @@ def washout(p: Parameters, m: Memory, seen: Reading, dt: real) -> Command:
     force = limited_force(p, seen.force)
     rate = limited_rate_cue(p, seen.rate)
 
-    beta_s = vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], m.beta_hp[2])
+    # The cab's true yaw: with k_yr or a turned start it is not the integral of the yaw cue.
+    turn = real(1.0) + p.turntable_share * (p.turntable_gain - real(1.0))
+    psi_s = m.psi_t_start + m.psi_h_start + turn * m.beta_hp[2]
+    beta_s = vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], psi_s)
     high_passed = high_pass_rates(p, m, rate_matrix_inverse(beta_s) * rate, dt)
     bandwidth = p.rate_bandwidth / (real(1.0) + real(0.5) * dt * p.rate_bandwidth)
     alpha = (high_passed - m.beta_hp_rate) * bandwidth
 
-    tilt = tilt_acceleration(p, m, m.beta_hp[2], m.beta_hp_rate[2], dt)
+    tilt = tilt_acceleration(p, m, psi_s, turn * m.beta_hp_rate[2], dt)
     r = split(p, m, alpha, tilt)
 
     aa1_h = centripetal_part(point_on_platform(p.cab, r.psi_t), r.psi_t_rate)

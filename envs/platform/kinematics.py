@@ -39,8 +39,10 @@ def _forward(
 
 def _sixes(label: str, values: ArrayLike) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=np.float64)
-    if array.ndim not in (1, 2) or array.shape[-1] != 6 or not np.isfinite(array).all():
-        raise DataError(f"{label} must be 6 finite numbers, or (n, 6); found shape {array.shape}")
+    if array.ndim not in (1, 2) or array.shape[-1] != 6:
+        raise DataError(f"{label} must be 6 numbers, or (n, 6); found shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise DataError(f"{label} is not finite: {array[~np.isfinite(array)][0]} among its values")
     return array
 
 

@@ -100,7 +100,7 @@ def dim_hexapod() -> Platform:
         hexapod=Hexapod(
             upper_joints=upper,
             lower_joints=lower,
-            neutral=(0.0, 0.0, -0.9055),
+            neutral=neutral_height(upper, lower, 1.210),
             extension=(1.045 - 1.210, 1.375 - 1.210),
             velocity=1.0,
             acceleration=10.0,
@@ -136,13 +136,13 @@ def table_24_inch() -> Platform:
 def nads_1() -> Platform:
     """NADS-1 (Iowa): carriage +-9.75 m, yaw +-330 degrees (m).
 
-    Its hexapod's joints are not published; the paper's joints with a stroke of +-0.545 m give its
-    heave of +-0.61 m and tilt of +-25 degrees.
+    Its hexapod's joints are not published. The paper's joints with a stroke of +-0.545 m come near its
+    heave of +-0.61 m and tilt of +-25 degrees: 0.60 m up, 0.64 m down, roll 24.5, pitch 22.3 to 22.9 degrees.
     """
     base = paper().hexapod
     return Platform(
         name="nads-1",
-        description="NADS-1: +-9.75 m carriage, heave +-0.61 m, tilt +-25 degrees, yaw +-330 degrees",
+        description="NADS-1: +-9.75 m carriage, heave +-0.6 m, tilt about +-23 degrees, yaw +-330 degrees",
         carriage=Carriage(travel_x=(-9.75, 9.75), travel_y=(-9.75, 9.75), velocity=6.1, acceleration=6.1),
         hexapod=Hexapod(
             upper_joints=base.upper_joints,

@@ -131,6 +131,30 @@ def test_it_begins_where_the_machine_is():
     np.testing.assert_allclose(felt.carriage[-1] + felt.hexapod[-1, :2], [5.1, -2.95], atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["est1", "est3", "lc2", "classical"])
+@pytest.mark.parametrize(("axis", "angle"), [(8, 2.0), (7, 0.2)])
+def test_a_turned_start_is_no_cue(name, axis, angle):
+    """Turntable or hexapod yaw: the driver of a car at rest feels nothing of where the machine began."""
+    start = np.zeros(9)
+    start[axis] = angle
+    felt = rollout(ClassicalWashout(name), trace(6.0), start=start)
+    np.testing.assert_allclose(felt.f_felt, np.tile([0.0, 0.0, -9.81], (len(felt.time), 1)), atol=1e-6)
+    np.testing.assert_allclose(felt.w_felt, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("gain", [0.7, 1.0, 1.5])
+def test_a_scaled_turntable_leaves_the_sustained_force_where_it_belongs(gain):
+    """k_yr turns the cab farther or less far than the car; tilt coordination follows the cab's true yaw."""
+
+    def rate(t):
+        return np.column_stack([0.0 * t, 0.0 * t, np.where(t > 1.0, 0.1, 0.0)])
+
+    steady = trace(40.0, lambda t: np.column_stack([0.0 * t, np.clip(t - 1.0, 0.0, 1.5)]), rate)
+    parameters = replace(load_washout("classical"), force_scale=(1.0, 1.0, 1.0), turntable_gain=gain)
+    felt = rollout(ClassicalWashout(parameters), steady)
+    np.testing.assert_allclose(felt.f_felt[-1, :2], [0.0, 1.5], atol=0.05)
+
+
 def test_its_start_pose_is_a_parameter():
     washout = ClassicalWashout(
         replace(load_washout("est1"), start_carriage=(4.0, 0.0), start_hexapod=(0.0, 0.1, 0.0))
@@ -195,6 +219,9 @@ def test_a_policy_from_a_file(tmp_path):
         ("name: x\nhps: [{order: 3}, {order: 0}]", "hps.0.order"),
         ("name: x\nlpc: {frequency: -1}", "lpc.frequency"),
         ("name: x\nforce_scale: [1, .nan, 1]", "force_scale.1"),
+        ("name: x\nforce_limit: [-1, 1, 1]", "force_limit.0"),
+        ("name: x\nrate_bandwidth: 1.0e+6", "rate_bandwidth"),
+        ("name: x\nfollow_frequency: 1000", "follow_frequency"),
         ("description: x", "'name' is missing"),
         ("- 1", "expected fields"),
     ],

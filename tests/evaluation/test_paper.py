@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from motion_cueing.evaluation.command_line import main
 from motion_cueing.evaluation.paper import CASES, drive_cases
-from motion_cueing.evaluation.paper_checks import Check, all_checks
+from motion_cueing.evaluation.paper_checks import Check, all_checks, within_limits
 from motion_cueing.evaluation.trajectory import Trajectory
 
 
@@ -24,11 +26,27 @@ def test_every_statement_passes(drives):
     assert [f"{c.case} {c.quantity}: {c.measured:.3g}" for c in checks if not c.passed] == []
 
 
+def standing(drive: Trajectory) -> Trajectory:
+    """The same drive on a machine that does not move."""
+    rest = np.tile([0.0, 0.0, -9.81], (len(drive.time), 1))
+    return replace(drive, f_felt=rest, carriage=np.zeros_like(drive.carriage))
+
+
 def test_a_wrong_machine_would_fail(drives):
     """The checks can fail: one case's trajectory in another's place."""
-    swapped = {**drives, "EST2": drives["EST1"], "LC1": drives["LC2"]}
+    swapped = {
+        "EST1": drives["EST2"], "EST2": drives["EST1"], "EST3": drives["EST2"],
+        "BRK": standing(drives["BRK"]), "LC1": drives["LC2"], "LC2": drives["LC1"],
+    }  # fmt: skip
     failed = {check.case for check in all_checks(swapped) if not check.passed}
-    assert {"EST2", "LC1", "LC2"} <= failed
+    assert failed == set(CASES)
+
+
+def test_a_met_limit_would_fail(drives):
+    flags = drives["BRK"].limits_active.copy()
+    flags[100, 0] = 1
+    check = within_limits("BRK", replace(drives["BRK"], limits_active=flags))
+    assert not check.passed
 
 
 def test_bounds_are_inclusive_and_two_sided():

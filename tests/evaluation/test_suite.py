@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,24 @@ def test_a_failed_drive_or_maneuver_leaves_the_others():
     ]
     assert list(outcome.maneuvers) == ["good"]
     assert finished == [("good", ["fine"])]
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_drive_without_metrics_leaves_the_others():
+    """A cue beyond all bounds makes a J that is no number; the other policies and maneuvers are reported."""
+
+    def far(trace):
+        return replace(drive(), f_felt=np.full((len(drive().time), 3), 1e200))
+
+    outcome = run_suite({"a": cues}, {"far": far, "good": lambda _: drive()}, finish=lambda *_: None)
+    assert list(outcome.maneuvers["a"]) == ["good"]
+    assert [(f.maneuver, f.policy) for f in outcome.failures] == [("a", "far")]
+
+
+def test_a_figure_that_fails_costs_no_result():
+    outcome = run_suite({"a": cues}, {"good": lambda _: drive()}, finish=raises(OSError("disk full")))
+    assert list(outcome.maneuvers["a"]) == ["good"]
+    assert "disk full" in outcome.failures[0].message
 
 
 def test_where_every_policy_fails_nothing_is_finished():
