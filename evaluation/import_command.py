@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -48,7 +49,7 @@ class ImportCommand:
     out: Annotated[Path, arg(metavar="FILE")]
     """Cues to write, as CSV; packed if the name ends in .gz."""
     plot: Annotated[Path | None, arg(metavar="FILE.png")] = None
-    """Picture to write: cues against the car's own motion, raw signals, spectra."""
+    """Picture (PNG) to write: cues against the car's own motion, raw signals, spectra."""
     decimals: Annotated[int | None, arg(metavar="N")] = None
     """Digits after the point in the cues; nine significant digits if not given."""
     conversion: OmitArgPrefixes[TypedOptions] = field(default_factory=TypedOptions)
@@ -65,6 +66,9 @@ def run(command: ImportCommand) -> int:
         raise ConfigurationError(f"decimals is {command.decimals}; use 0 to {_MOST_DECIMALS}")
     if command.out.resolve() == command.file.resolve():
         raise ConfigurationError(f"out: {command.out} is the log itself; name another file")
+    _check_target("out", command.out)
+    if command.plot is not None:
+        _check_plot(command.plot, command)
     columns, units = parse_columns(chain.from_iterable(command.column))
     name = command.out.name.removesuffix(".gz").removesuffix(".csv")
     imported = import_log(command.file, columns, units=units, options=command.conversion, name=name)
@@ -77,3 +81,34 @@ def run(command: ImportCommand) -> int:
         write_bytes(command.plot, import_plot(imported))
         print(f"{command.plot}: picture")
     return 0
+
+
+def _check_plot(plot: Path, command: ImportCommand) -> None:
+    if plot.suffix.lower() != ".png":
+        raise ConfigurationError(f"plot: {plot} does not end in .png, the only format of the picture")
+    if plot.resolve() in (command.file.resolve(), command.out.resolve()):
+        raise ConfigurationError(f"plot: {plot} is the log or the cues; name another file")
+    _check_target("plot", plot)
+
+
+def _check_target(option: str, path: Path) -> None:
+    """Refuse a file that cannot be written, before the work and before anything else is written."""
+    folder = next(parent for parent in path.absolute().parents if parent.exists())
+    if path.is_dir():
+        raise ConfigurationError(f"{option}: {path} is a folder; name a file")
+    try:
+        probe(folder)
+    except OSError as error:
+        raise ConfigurationError(
+            f"{option}: {path} cannot be written ({error.strerror}); name another folder"
+        ) from None
+
+
+def probe(folder: Path) -> None:
+    """Make a file in a folder, and remove it: permissions alone do not tell (read-only disks, root).
+
+    Raises:
+        OSError: the folder takes no files.
+    """
+    with tempfile.TemporaryFile(dir=folder):
+        pass

@@ -67,7 +67,8 @@ class Maneuver(ABC):
         if offset > LARGEST_OFFSET:
             raise ConfigurationError(
                 f"{car.name} cannot drive {self.name} with {self._asked()}: "
-                f"it came {offset:.1f} m off its path (at most {LARGEST_OFFSET:g} m); ask for less speed or gentler bends"
+                f"it came {offset:.1f} m off its path (at most {LARGEST_OFFSET:g} m); "
+                "ask for less speed or gentler bends"
             )
 
     def _asked(self) -> str:
