@@ -113,7 +113,7 @@ def test_legs_that_cannot_close_are_refused():
 
 @pytest.mark.parametrize("bad", [[0.0] * 5, [0.0] * 5 + [np.nan], [[[0.0] * 6]], 1.0])
 def test_broken_poses_are_refused(bad):
-    with pytest.raises(DataError, match="pose (must be 6 numbers|is not finite)"):
+    with pytest.raises(DataError, match=r"pose (must be 6 numbers|is not finite)"):
         legs_of_pose(PRESETS["paper"].hexapod, bad)
-    with pytest.raises(DataError, match="extensions (must be 6 numbers|is not finite)"):
+    with pytest.raises(DataError, match=r"extensions (must be 6 numbers|is not finite)"):
         pose_of_legs(PRESETS["paper"].hexapod, bad)
