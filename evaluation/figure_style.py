@@ -8,10 +8,10 @@ from contextlib import AbstractContextManager
 from typing import Any, Final
 
 import matplotlib as mpl
-from matplotlib.rcsetup import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
 
 from .verdict import STILL
 
