@@ -17,8 +17,8 @@ BASICS = {"envs.errors", "envs.settings", "envs.storage", "envs.precision", "env
 ALLOWED = {
     "envs": {"envs"},
     "baselines": {"envs", "baselines"},
-    "evaluation": {"envs", "baselines", "evaluation"},
-    "train": {"envs", "baselines", "evaluation", "train"},
+    "train": {"envs", "baselines", "train"},
+    "evaluation": {"envs", "baselines", "train", "evaluation"},
 }
 """What each package may import of this project."""
 
