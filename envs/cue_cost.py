@@ -6,14 +6,13 @@ import math
 from typing import Any
 
 import warp as wp
-from pydantic.dataclasses import dataclass
 
 from .precision import real, vec3
-from .settings import STRICT, Positive
+from .settings import Positive, configuration
 from .state import State
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class CueCost:
     """|df|^2 / force^2 + |dw|^2 / rate^2, whose mean over time is J.
 

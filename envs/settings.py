@@ -1,17 +1,20 @@
 """Configurations: frozen, checked dataclasses that round-trip through YAML.
 
-A configuration class is a pydantic dataclass made with :data:`STRICT`: unknown fields, wrong
+A configuration class is a pydantic dataclass made with :func:`configuration`: unknown fields, wrong
 types, NaN and infinity are refused when it is made. Ranges are declared with the types below.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 
 import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+from typing_extensions import dataclass_transform
 
 from .errors import ConfigurationError, DataError, suggest
 from .storage import write_text
@@ -24,6 +27,28 @@ Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
 T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def configuration(cls: type[T]) -> type[T]:
+    """Make a class a configuration; the decorator.
+
+    Raises:
+        ConfigurationError: when an object of it is made, or replaced, with a field that is unknown,
+            missing, of the wrong type or out of range.
+    """
+    made: Any = dataclass(frozen=True, config=STRICT)(cls)
+    check = made.__init__
+
+    @functools.wraps(check)
+    def checked(self: Any, /, *values: Any, **fields: Any) -> None:
+        try:
+            check(self, *values, **fields)
+        except ValidationError as error:
+            raise ConfigurationError(f"{made.__name__}: {describe(error, made)}") from None
+
+    made.__init__ = checked
+    return made  # type: ignore[no-any-return]
 
 
 def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:

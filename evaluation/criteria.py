@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from math import radians
 
-from pydantic.dataclasses import dataclass
-
 from ..envs.cue_cost import CueCost
-from ..envs.settings import STRICT, Positive, Vector3
+from ..envs.settings import Positive, Vector3, configuration
 
 _ZONE = CueCost()
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Criteria:
     """Published thresholds; the defaults are what every table of this project uses.
 

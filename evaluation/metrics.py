@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from pydantic.dataclasses import dataclass
 
 from ..envs.cues import GRAVITY
 from ..envs.platform import ACTUATORS, AXES
-from ..envs.settings import STRICT
+from ..envs.settings import configuration
 from . import signals
 from .criteria import Criteria
 from .trajectory import AT_ACCELERATION, AT_DISPLACEMENT, AT_VELOCITY, Floats, Trajectory
@@ -21,7 +20,7 @@ _REST: Final = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
 """What a driver at rest on level ground feels on each of the axes."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class AxisMetrics:
     """Metrics of one axis; units of the axis (m/s^2 or rad/s) unless another is named.
 
@@ -54,7 +53,7 @@ class AxisMetrics:
     perceived_cue_error: float
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ActuatorMetrics:
     """Use of one actuator.
 
@@ -69,7 +68,7 @@ class ActuatorMetrics:
     at_limit: float
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Metrics:
     """All metrics of one drive.
 

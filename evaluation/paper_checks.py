@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from pydantic.dataclasses import dataclass
 
 from ..envs.cues import GRAVITY
-from ..envs.settings import STRICT
+from ..envs.settings import configuration
 from .trajectory import Floats, Trajectory
 
 ONSET_WINDOW: Final = 1.5
@@ -20,7 +19,7 @@ SETTLED: Final = 5.0
 """Length of the end of a steady turn over which steady values are taken, s."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Check:
     """One statement of the paper and what was measured.
 

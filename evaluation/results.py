@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pydantic import JsonValue
-from pydantic.dataclasses import dataclass
 
 from ..envs.errors import DataError
-from ..envs.settings import STRICT, from_dict, to_dict
+from ..envs.settings import configuration, from_dict, to_dict
 from ..envs.storage import write_text
 from .criteria import Criteria
 from .metrics import Metrics
@@ -23,7 +22,7 @@ SCHEMA: Final = 1
 """Version of ``results.json``; a reader refuses others."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Failure:
     """A drive that gave no result.
 
@@ -38,7 +37,7 @@ class Failure:
     message: str
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Provenance:
     """What made the results.
 
@@ -59,7 +58,7 @@ class Provenance:
     configuration: dict[str, JsonValue]
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Results:
     """Everything an evaluation found.
 

@@ -11,9 +11,7 @@ from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import Final, Literal
 
-from pydantic.dataclasses import dataclass
-
-from ..envs.settings import STRICT
+from ..envs.settings import configuration
 from .metrics import CUE_AXES, Metrics
 
 Cause = Literal["false", "missing", "shape"]
@@ -31,7 +29,7 @@ Terms = Mapping[tuple[str, Cause], float]
 """Parts of J by axis and cause; they add up to J."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Advantage:
     """Why one policy's J is lower than another's.
 
@@ -56,7 +54,7 @@ class Advantage:
     worse_cause: Cause | None
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Verdict:
     """The order of the policies on one maneuver, or over the suite.
 
@@ -89,7 +87,7 @@ class Verdict:
         return lines
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Standing:
     """One policy over the suite.
 

@@ -13,14 +13,13 @@ from typing import Literal
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic.dataclasses import dataclass
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.settings import (
-    STRICT,
     NonNegative,
     Positive,
     Vector3,
+    configuration,
     from_dict,
     load,
     save,
@@ -29,7 +28,7 @@ from motion_cueing.envs.settings import (
 from motion_cueing.envs.storage import replacing, write_bytes, write_text
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Spring:
     """Inner configuration."""
 
@@ -37,7 +36,7 @@ class Spring:
     damping: NonNegative = 0.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Machine:
     """Outer configuration."""
 
@@ -47,14 +46,14 @@ class Machine:
     spring: Spring = Spring()
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Roller:
     """A configuration that shares a tuple or a union with another."""
 
     radius: Positive = 1.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Assembly:
     """Configurations within other types."""
 

@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
 from ...envs.errors import UnknownNameError
-from ...envs.settings import STRICT, Positive, Vector2, Vector3, load
+from ...envs.settings import Positive, Vector2, Vector3, configuration, load
 
 Frequency = Annotated[float, Field(ge=0.0, le=100.0)]
 Limits = tuple[Positive, Positive, Positive]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class HighPass:
     """One high-pass filter.
 
@@ -35,7 +34,7 @@ class HighPass:
 OPEN: Final = HighPass()
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class LowPass:
     """w^2 / (s^2 + 2 zeta w s + w^2): break frequency w, rad/s, and damping zeta."""
 
@@ -43,7 +42,7 @@ class LowPass:
     damping: Positive = 1.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class TiltCoordination:
     """Sustained specific force by tilt.
 
@@ -60,7 +59,7 @@ class TiltCoordination:
     approach: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class WashoutParameters:
     """The whole algorithm, in the paper's order of blocks.
 

@@ -9,10 +9,9 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 from scipy.ndimage import gaussian_filter1d
 
-from ..settings import STRICT, Positive
+from ..settings import Positive, configuration
 from .corridors import GRID, Gate, smoothest_way
 from .driver import Driver
 from .maneuver import KMH, Maneuver
@@ -56,7 +55,7 @@ def practised_path(gates: tuple[Gate, ...], car: Car, speed: float, length: floa
     return Path.of_offset(x, aim)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ConeManeuver(Maneuver):
     """A drive between cones at constant speed, along the smoothest way through them.
 
@@ -89,7 +88,7 @@ class ConeManeuver(Maneuver):
         return Plan(self.name, car, path, schedule, driver=TEST_DRIVER)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class DoubleLaneChange(ConeManeuver):
     """ISO 3888-1: out to a lane 3.5 m to the left and back, at 80 km/h.
 
@@ -115,7 +114,7 @@ class DoubleLaneChange(ConeManeuver):
         )
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ObstacleAvoidance(ConeManeuver):
     """ISO 3888-2: round an obstacle to the left and back, sections of 12, 13.5, 11, 12.5 and 12 m.
 
@@ -147,7 +146,7 @@ class ObstacleAvoidance(ConeManeuver):
         )
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Slalom(ConeManeuver):
     """Round cones in a row, alternately to the left and to the right of them.
 

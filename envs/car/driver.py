@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import warp as wp
-from pydantic.dataclasses import dataclass
 
 from ..cues import GRAVITY
 from ..precision import real
-from ..settings import STRICT, NonNegative, Positive
+from ..settings import NonNegative, Positive, configuration
 from .tires import slip_for
 from .vehicle_model import air_drag
 from .vehicle_state import FORWARD, LATERAL, CarParameters, State
@@ -15,7 +14,7 @@ from .vehicle_state import FORWARD, LATERAL, CarParameters, State
 wp.set_module_options({"enable_backward": False})
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Driver:
     """How a driver steers and uses the pedals. The values are engineering choices.
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
-from pydantic.dataclasses import dataclass
 
-from ..settings import STRICT, NonNegative, Positive, Vector3
+from ..settings import NonNegative, Positive, Vector3, configuration
 
 Sign = Literal["estimate", "keep", "flip"]
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ImportOptions:
     """How a log becomes cues. Angles are in degrees because a person types them."""
 

@@ -8,11 +8,10 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, Final
 
 import numpy as np
-from pydantic.dataclasses import dataclass
 
 from ..cues import CueTrace
 from ..errors import ConfigurationError
-from ..settings import STRICT, Positive
+from ..settings import Positive, configuration
 from .fleet import SEDAN
 from .simulation import Plan, simulate
 from .vehicles import Car
@@ -27,7 +26,7 @@ LARGEST_OFFSET: Final = 1.0
 """How far from its path a driver who follows one may be, m; the package's own maneuvers stay within 0.4 m."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Maneuver(ABC):
     """A drive of a car, from calm to calm.
 

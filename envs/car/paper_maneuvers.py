@@ -7,10 +7,9 @@ from dataclasses import field
 from typing import ClassVar
 
 import numpy as np
-from pydantic.dataclasses import dataclass
 
 from ..cues import GRAVITY
-from ..settings import STRICT, Positive
+from ..settings import Positive, configuration
 from .driver import Driver
 from .maneuver import KMH, Maneuver
 from .paths import STEP, Path, clothoids
@@ -23,7 +22,7 @@ def _late_driver() -> Driver:
     return Driver(anticipation=0.1)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class SteadyTurn(Maneuver):
     """60 km/h from a straight into a circle to the right of 150 m, and round it (cases EST1 to EST3).
 
@@ -56,7 +55,7 @@ class SteadyTurn(Maneuver):
         return Plan(self.name, car, path, schedule, driver=self.driver)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Braking(Maneuver):
     """80 km/h to a full stop with 0.25 g, and standing (case BRK). The pedal is held until the car stands.
 
@@ -84,7 +83,7 @@ class Braking(Maneuver):
         return Plan(self.name, car, straight(), schedule)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class LaneChange(Maneuver):
     """One lane to the left at 60 km/h: one sine of lateral acceleration (cases LC1 and LC2).
 

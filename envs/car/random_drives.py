@@ -7,11 +7,10 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
 from ..cues import CueTrace
 from ..errors import ConfigurationError, UnknownNameError
-from ..settings import STRICT, NonNegative
+from ..settings import NonNegative, configuration
 from .fleet import car_names, get_car
 from .paths import STEP, Path
 from .roads import KINDS, Road
@@ -31,7 +30,7 @@ LONGEST: Final = 86_400.0
 """Of a drive, s: a day, some gigabyte of cues."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class RandomDrives:
     """A distribution of drives.
 

@@ -7,10 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic.dataclasses import dataclass
 
 from ..cues import GRAVITY
-from ..settings import STRICT, Positive
+from ..settings import Positive, configuration
 from .maneuver import DEGREE, KMH, Maneuver
 from .schedules import DT, Hold, Schedule
 from .simulation import Plan, straight
@@ -19,7 +18,7 @@ from .vehicles import Car
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class StepSteer(Maneuver):
     """ISO 7401: the wheel is turned to the right at a constant rate, held, and turned back.
 
@@ -53,7 +52,7 @@ class StepSteer(Maneuver):
         return Plan(self.name, car, straight(), schedule, steering=steering)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class SineWithDwell(Maneuver):
     """FMVSS 126: one sine of steering at 0.7 Hz with a pause of 0.5 s at its second peak.
 

@@ -6,10 +6,9 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from pydantic.dataclasses import dataclass
 
 from ..cues import GRAVITY
-from ..settings import STRICT, Positive
+from ..settings import Positive, configuration
 from .maneuver import DEGREE, KMH, Maneuver
 from .paths import STEP, Path, bend, smooth_steps
 from .schedules import Change, Hold, Schedule
@@ -18,7 +17,7 @@ from .speed_planning import Style, along_path, speed_limit
 from .vehicles import Car
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Acceleration(Maneuver):
     """Pulling away from rest to 80 km/h with 0.25 g, the counterpart of braking.
 
@@ -45,7 +44,7 @@ class Acceleration(Maneuver):
         return Plan(self.name, car, straight(), Schedule.of(0.0, phases))
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class StopAndGo(Maneuver):
     """A queue: rolling, stopping, waiting and pulling away again, each time a little faster.
 
@@ -81,7 +80,7 @@ class StopAndGo(Maneuver):
         return Plan(self.name, car, straight(), Schedule.of(self.speeds[0], phases))
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Roundabout(Maneuver):
     """Into a roundabout (traffic on the right, round it anticlockwise), out at the exit on the left.
 
@@ -123,7 +122,7 @@ class Roundabout(Maneuver):
         return Plan(self.name, car, path, along_path(limit, style, [], None))
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Hill(Maneuver):
     """Up, over the crest, and down again at constant speed.
 

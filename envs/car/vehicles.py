@@ -6,15 +6,14 @@ from dataclasses import field
 from typing import Annotated
 
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
 from ..cues import GRAVITY
-from ..settings import STRICT, NonNegative, Positive, Vector3
+from ..settings import NonNegative, Positive, Vector3, configuration
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Suspension:
     """The sprung body: it rolls and pitches about a point under the c.g., as second-order masses.
 
@@ -45,7 +44,7 @@ class Suspension:
                 raise ValueError(f"{label} must exceed the body's toppling moment, {weight:.0f} N m/rad")
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Tires:
     """Tires of an axle (both wheels together): Magic Formula, friction ellipse, relaxation length.
 
@@ -69,7 +68,7 @@ class Tires:
     low_speed_damping: NonNegative = 0.13
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Steering:
     """From the steering wheel to the road wheels.
 
@@ -84,7 +83,7 @@ class Steering:
     max_rate: Positive = 17.45
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Drivetrain:
     """Engine, brakes and resistances. The defaults are engineering choices of the usual size.
 
@@ -116,7 +115,7 @@ class Drivetrain:
     standstill_damping: NonNegative = 15.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Car:
     """A car. Lengths in metres, body axes x forward, y right, z down, origin at the c.g.
 

@@ -15,10 +15,10 @@ from pydantic.dataclasses import dataclass
 from scipy import signal
 
 from ..errors import UnknownNameError
-from ..settings import STRICT, NonNegative, Positive, Vector3
+from ..settings import NonNegative, Positive, Vector3, configuration
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Canals:
     """Semicircular canals: T_L T_a s^2 (1 + T_lead s) / ((T_L s + 1) (T_s s + 1) (T_a s + 1)).
 
@@ -43,7 +43,7 @@ class Canals:
         return np.array(numerator), np.asarray(np.polymul(slow, [self.short, 1.0]), dtype=np.float64)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Otoliths:
     """Otoliths: gain (T_lead s + 1) / ((T_L s + 1) (T_s s + 1)); the same on every axis.
 
@@ -65,7 +65,7 @@ class Otoliths:
         return np.array([self.lead, 1.0]), np.asarray(denominator, dtype=np.float64)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class VestibularModel:
     """Canals and otoliths of one published set.
 

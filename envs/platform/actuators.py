@@ -14,15 +14,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 from scipy.linalg import expm
 
 from ..precision import real, vec2
-from ..settings import STRICT, NonNegative, Positive
+from ..settings import NonNegative, Positive, configuration
 from .state import Machine
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ActuatorDynamics:
     """Second-order lag and dead time of one subsystem.
 

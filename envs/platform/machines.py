@@ -7,10 +7,9 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
 from ..errors import ConfigurationError
-from ..settings import STRICT, Positive, Vector2, Vector3
+from ..settings import Positive, Vector2, Vector3, configuration
 from .actuators import ActuatorDynamics
 
 Joints = Annotated[tuple[Vector3, ...], Field(min_length=6, max_length=6)]
@@ -22,7 +21,7 @@ def _check_range(name: str, travel: Vector2) -> None:
         raise ConfigurationError(f"{name} must contain 0, found {list(travel)}")
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Carriage:
     """The x-y carriage, each axis by itself.
 
@@ -45,7 +44,7 @@ class Carriage:
         _check_range("travel_y", self.travel_y)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Hexapod:
     """Six legs between a lower frame (F_V) and the payload platform (F_H); leg i joins B_i to A_i.
 
@@ -82,7 +81,7 @@ class Hexapod:
         return np.asarray(np.linalg.norm(legs, axis=1))
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Turntable:
     """The turntable on the hexapod's platform.
 
@@ -103,7 +102,7 @@ class Turntable:
             _check_range("travel", self.travel)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Cab:
     """Where the driver sits.
 
@@ -116,7 +115,7 @@ class Cab:
     head: Vector3 = (-0.10, 0.0, -0.65)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Platform:
     """A whole machine: any subsystem but the hexapod may be missing.
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 
 from ..car import RandomDrives, maneuver_names, recording_names
 from ..cue_cost import CueCost
@@ -16,7 +15,7 @@ from ..perception.models import vestibular_model_names
 from ..platform.machines import Platform
 from ..platform.presets import platform_names
 from ..platform.state import AXES
-from ..settings import STRICT, NonNegative, Positive, Vector2, Vector3
+from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
 
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
@@ -36,7 +35,7 @@ def _check_range(name: str, limits: Vector2) -> None:
         raise ValueError(f"{name} must be a range from low to high, found {list(limits)}")
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ObservationOptions:
     """What the observation holds beside its fixed rows.
 
@@ -56,7 +55,7 @@ class ObservationOptions:
     stack: PositiveCount = 1
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class ActionOptions:
     """What an action means; always a number in [-1, 1] for each entry.
 
@@ -80,7 +79,7 @@ class ActionOptions:
         _check_names("axis", self.frozen, AXES)
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class RewardWeights:
     """Weight of each term of the reward, which is minus their weighted sum; 0 switches a term off.
 
@@ -105,7 +104,7 @@ class RewardWeights:
     failure: NonNegative = 100.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class RewardOptions:
     """The reward's weights, scales and thresholds.
 
@@ -126,7 +125,7 @@ class RewardOptions:
     stroke_margin: Share = 0.8
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class EpisodeOptions:
     """What is driven, from where to where.
 
@@ -158,7 +157,7 @@ class EpisodeOptions:
             raise ValueError("random_start needs a duration, shorter than the drives")
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class RandomisationOptions:
     """What differs from episode to episode; nothing by default. Cars are ``episode.random.cars``.
 
@@ -188,7 +187,7 @@ class RandomisationOptions:
                 _check_range(name, getattr(self, name))
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class TaskOptions:
     """The whole environment.
 
