@@ -82,6 +82,8 @@ class WashoutParameters:
         start_carriage: C'(0): where the carriage begins a drive, m.
         start_hexapod: S'(0): where the hexapod begins a drive, m from neutral.
         follow_frequency: How fast machine and reference come together again after a limit was hit, rad/s.
+        return_frequency: How fast a machine that a limit held back is led home, where HPI of order 0 or 1
+            would leave it, rad/s; without a limit it has no effect.
     """
 
     name: str
@@ -101,6 +103,7 @@ class WashoutParameters:
     start_carriage: Vector2 = (0.0, 0.0)
     start_hexapod: Vector3 = (0.0, 0.0, 0.0)
     follow_frequency: Annotated[float, Field(gt=0.0, le=50.0)] = 5.0
+    return_frequency: Annotated[float, Field(ge=0.0, le=5.0)] = 0.1
 
 
 _PRESETS: Final = Path(__file__).parent / "presets"

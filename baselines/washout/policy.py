@@ -43,7 +43,13 @@ def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
     lpc = p.lpc or LowPass(1.0)
     k.carriage_share = 1.0 if p.lpc else 0.0
     k.lpc_frequency, k.lpc_damping = lpc.frequency, lpc.damping
-    for name in ("rate_bandwidth", "turntable_share", "turntable_gain", "follow_frequency"):
+    for name in (
+        "rate_bandwidth",
+        "turntable_share",
+        "turntable_gain",
+        "follow_frequency",
+        "return_frequency",
+    ):
         setattr(k, name, getattr(p, name))
     k.cab = vec3(*cab.reference_point)
     return k

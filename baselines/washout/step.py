@@ -11,6 +11,8 @@ limit has come between.
 
 from __future__ import annotations
 
+from typing import Final
+
 import warp as wp
 
 from ...envs.platform.cab import (
@@ -29,6 +31,12 @@ from ...envs.platform.frames import (
 from ...envs.precision import real, vec2, vec3, vec9
 from .filters import HighPassParameters, high_pass, low_pass, moved
 from .tilt import limited_tilt, tilt_angle_rates, tilt_angles
+
+HELD_BACK: Final = 0.001
+"""Distance between machine and reference that says that a limit has come between, m or rad."""
+
+RETURNS: Final = 10.0
+"""Times 1 / return_frequency in which the way home fades out after a limit."""
 
 
 @wp.struct
@@ -60,6 +68,7 @@ class Parameters:
     lpc_frequency: real
     lpc_damping: real
     follow_frequency: real
+    return_frequency: real
     cab: vec3  # D_o
 
 
@@ -81,6 +90,8 @@ class Memory:
     velocity: vec3
     carriage: vec2  # C'
     carriage_rate: vec2
+    home: vec3  # Q' when the episode began
+    recovery: real  # from 1 when a limit has held the machine back to 0 when that is long past
     psi_t_start: real  # where the turntable stood when the episode began
     psi_h_start: real  # the same of the hexapod's yaw
 
@@ -225,6 +236,34 @@ def high_passed_motion(p: Parameters, m: Memory, r: Rotation, force: vec3, dt: r
 
 
 @wp.func
+def homeward(p: Parameters, order: int, recovery: real, x: real, v: real) -> real:
+    """Acceleration that leads Q' home after a limit, where HPI of this order would not."""
+    if order == 2:
+        return real(0.0)
+    w = p.return_frequency
+    return -recovery * (w * w * x + real(2.0) * w * v)
+
+
+@wp.func
+def recovered(p: Parameters, m: Memory, q: vec3) -> vec3:
+    """The acceleration of Q' with what leads it home; without a limit it is as it was."""
+    x = m.displacement - m.home
+    v = m.velocity
+    return q + vec3(
+        homeward(p, p.hpi_x.order, m.recovery, x[0], v[0]),
+        homeward(p, p.hpi_y.order, m.recovery, x[1], v[1]),
+        homeward(p, p.hpi_z.order, m.recovery, x[2], v[2]),
+    )
+
+
+@wp.func
+def hexapod_yaw_home(p: Parameters, m: Memory) -> vec3:
+    """Yaw rate that takes the hexapod's yaw home after a limit; the turntable may stand anywhere."""
+    share = real(1.0) - p.turntable_share
+    return vec3(real(0.0), real(0.0), m.recovery * p.return_frequency * share * m.beta_hp[2])
+
+
+@wp.func
 def carriage_acceleration(p: Parameters, m: Memory, dt: real) -> vec2:
     """Eq. (49): acceleration of C' = LPC Q'."""
     a_x = low_pass(p.lpc_frequency, p.lpc_damping, m.carriage[0], m.carriage_rate[0], m.displacement[0], dt)
@@ -331,6 +370,9 @@ def led_back(p: Parameters, m: Memory, seen: Reading, r: Rotation, after: Memory
     out.tilt_rate = after.tilt_rate + k * vec2(b_rate[0], b_rate[1])
     out.beta_hp = after.beta_hp + k * vec3(zero, zero, yaw)
     out.beta_hp_rate = after.beta_hp_rate + k * vec3(zero, zero, yaw_rate)
+    fading = real(1.0) - p.return_frequency * dt / real(wp.static(RETURNS))
+    held_back = wp.max(wp.length(moved_by), wp.abs(b[2])) / real(wp.static(HELD_BACK))
+    out.recovery = wp.max(m.recovery * fading, wp.min(held_back, real(1.0)))
     return out
 
 
@@ -340,6 +382,7 @@ def initial_memory(p: Parameters, seen: Reading) -> Memory:
     m = Memory()
     m.carriage = seen.carriage * p.carriage_share
     m.displacement = seen.displacement + vec3(m.carriage[0], m.carriage[1], real(0.0))
+    m.home = m.displacement
     m.tilt = vec2(seen.beta[0], seen.beta[1])
     m.psi_t_start = seen.psi_t
     m.psi_h_start = seen.beta[2]
@@ -358,7 +401,7 @@ def washout(p: Parameters, m: Memory, seen: Reading, dt: real) -> Command:
     beta_s = vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], psi_s)
     high_passed = high_pass_rates(p, m, rate_matrix_inverse(beta_s) * rate, dt)
     bandwidth = p.rate_bandwidth / (real(1.0) + real(0.5) * dt * p.rate_bandwidth)
-    alpha = (high_passed - m.beta_hp_rate) * bandwidth
+    alpha = (high_passed - hexapod_yaw_home(p, m) - m.beta_hp_rate) * bandwidth
 
     tilt = tilt_acceleration(p, m, psi_s, turn * m.beta_hp_rate[2], dt)
     r = split(p, m, alpha, tilt)
@@ -366,7 +409,7 @@ def washout(p: Parameters, m: Memory, seen: Reading, dt: real) -> Command:
     aa1_h = centripetal_part(point_on_platform(p.cab, r.psi_t), r.psi_t_rate)
     f1 = force - wp.transpose(turntable_rotation(r.psi_t)) * aa1_h
     linear = high_passed_motion(p, m, r, force, dt)
-    q = vec3(linear.action[0], linear.action[1], linear.action[2])
+    q = recovered(p, m, vec3(linear.action[0], linear.action[1], linear.action[2]))
     c = carriage_acceleration(p, m, dt)
 
     after = advance_translation(linear.memory, q, c, dt)
