@@ -19,7 +19,14 @@ from ..envs.task.batch import Batch
 from ..envs.task.environment import normalised
 from ..envs.task.options import TaskOptions
 from ..envs.task.reward_kernel import N_TERMS, TERMS
-from ..envs.task.spaces import action_space, observation_space, task_options
+from ..envs.task.spaces import (
+    action_space,
+    frames_per_second,
+    observation_space,
+    pictures_of,
+    rendered,
+    task_options,
+)
 
 
 class DrivingSimulatorVecEnv(VecEnv):
@@ -35,6 +42,8 @@ class DrivingSimulatorVecEnv(VecEnv):
         drives: Cue traces to drive instead of those of ``task.episode``.
         base: The base policy of the action modes "residual" and "gains".
         device: "cpu" or a CUDA device of Warp.
+        render_mode: "rgb_array", "human" (a window that shows the first environment), or None.
+        render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
         **fields: Fields of ``TaskOptions`` to replace, as dataclasses or dictionaries.
 
     Raises:
@@ -49,12 +58,16 @@ class DrivingSimulatorVecEnv(VecEnv):
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,
         device: str = "cpu",
+        render_mode: str | None = None,
+        render_size: tuple[int, int] | None = None,
         **fields: Any,
     ) -> None:
         self.task = task_options(task, fields)
         self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
-        self.render_mode: str | None = None
+        self._pictures = pictures_of(self.batch, render_mode, render_size)
+        self.render_mode = render_mode
         super().__init__(num_envs, observation_space(self.batch), action_space(self.batch))
+        self.metadata: dict[str, Any] = self.metadata | {"render_fps": frames_per_second(self.batch)}
         self._seeded = False
         self._began = time.perf_counter()
         self._returns = np.zeros(num_envs)
@@ -85,6 +98,8 @@ class DrivingSimulatorVecEnv(VecEnv):
     def _begin(self, mask: NDArray[np.bool_], drive: NDArray[np.int32] | None = None) -> None:
         self.batch.begin(mask, drive)
         self.batch.observe(mask)
+        if self._pictures is not None:
+            self._pictures.begin(mask)
         self._returns[mask], self._sums[mask], self._steps[mask] = 0.0, 0.0, 0
 
     def step_async(self, actions: ArrayLike) -> None:
@@ -104,6 +119,8 @@ class DrivingSimulatorVecEnv(VecEnv):
         self._returns += reward
         self._sums += arrays.terms.pull()
         self._steps += 1
+        if self._pictures is not None:
+            self._pictures.follow(np.ones(self.num_envs, dtype=bool))
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = terminated | truncated
         if ended.any():
@@ -122,8 +139,22 @@ class DrivingSimulatorVecEnv(VecEnv):
             "terms": dict(zip(TERMS, means, strict=True)),
         }
 
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """A frame of each environment; None of each without the mode "rgb_array"."""
+        frames = None if self._pictures is None else self._pictures.render()
+        return [None] * self.num_envs if frames is None else frames
+
+    def render(self, mode: str | None = None) -> NDArray[np.uint8] | None:
+        """Frames of all environments in one picture; in the mode "human" steps show themselves."""
+        if self.render_mode == "human":
+            rendered(self._pictures)
+            return None
+        return super().render(mode)
+
     def close(self) -> None:
-        """Nothing is to be closed."""
+        """Close the window, if there is one."""
+        if self._pictures is not None:
+            self._pictures.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute, the same for every environment."""

@@ -60,7 +60,7 @@ def _carriage(
     limit = np.where(motion.carriage >= 0.0, high, low)
     use = float(np.max(np.divide(motion.carriage, limit, out=np.zeros(2), where=limit != 0.0)))
     canvas.circle(x + right, y - ahead, 5.0, theme.colour_of_use(use))
-    words = f"x {motion.carriage[0]:+.1f}  y {motion.carriage[1]:+.1f} m".replace("-", "−")
+    words = f"x {signed(motion.carriage[0], 1)}  y {signed(motion.carriage[1], 1)} m"
     canvas.text(x, below, words, _LABEL, theme.FAINT_TEXT, "centre")
 
 
@@ -94,8 +94,7 @@ def _turntable(
     needle = radius * np.array([[0.0, -0.82], [0.17, 0.30], [0.0, 0.16], [-0.17, 0.30]])
     use = motion.turntable / (stops[1] if motion.turntable > 0.0 else stops[0])
     canvas.polygon((x, y) + needle @ np.array([[c, s], [-s, c]]), theme.colour_of_use(use))
-    degrees = f"{np.degrees(motion.turntable):+.0f}°".replace("-", "−")
-    canvas.text(x, below, degrees, _LABEL, theme.FAINT_TEXT, "centre")
+    canvas.text(x, below, f"{signed(np.degrees(motion.turntable), 0)}°", _LABEL, theme.FAINT_TEXT, "centre")
 
 
 def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: MotionView) -> None:
@@ -116,8 +115,13 @@ def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: 
     canvas.text(
         place.x + 0.5 * place.width,
         below,
-        f"{most:+.2f} m".replace("-", "−"),
+        f"{signed(most, 2)} m",
         _LABEL,
         theme.FAINT_TEXT,
         "centre",
     )
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign; what rounds to zero never flickers between +0 and −0."""
+    return f"{round(float(value), digits) + 0.0:+.{digits}f}".replace("-", "−")

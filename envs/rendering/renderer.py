@@ -91,6 +91,11 @@ class Renderer:
             self.close()
             self._closed_by_user = True
 
+    @property
+    def closed_by_user(self) -> bool:
+        """Whether the user has closed the window; no other one is opened."""
+        return self._closed_by_user
+
     def close(self) -> None:
         """Close the window, if there is one; frames can still be drawn."""
         if self._window is not None:

@@ -12,13 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..cues import CueTrace
 from ..errors import ActionError
+from ..simulator import TIME_STEP
 from .batch import Batch
 from .options import TaskOptions
 from .reward_kernel import TERMS
-from .spaces import action_space, checked_render_mode, observation_space, task_options
+from .spaces import (
+    RENDER_MODES,
+    action_space,
+    frames_per_second,
+    observation_space,
+    pictures_of,
+    rendered,
+    task_options,
+)
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
+Picture = NDArray[np.uint8]
 
 
 class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
@@ -28,14 +38,20 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         task: Everything that can be chosen; default: all defaults.
         drives: Cue traces to drive instead of those of ``task.episode``.
         base: The base policy of the action modes "residual" and "gains".
-        render_mode: One of ``metadata["render_modes"]``, or None.
+        render_mode: "rgb_array" (:meth:`render` gives a frame), "human" (a window, at the pace of the
+            drive), or None; see ``docs/rendering.md``.
+        render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 
     Raises:
         ConfigurationError: an option is unknown, of the wrong type or out of range.
+        RenderingUnavailableError: ``render_mode`` is given, and the extra ``render`` is not installed.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium declares it)
+    metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 1.0 / TIME_STEP,
+    }
 
     def __init__(
         self,
@@ -44,14 +60,18 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,
         render_mode: str | None = None,
+        render_size: tuple[int, int] | None = None,
         **fields: Any,
     ) -> None:
-        EzPickle.__init__(self, task, drives=drives, base=base, render_mode=render_mode, **fields)
-        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        looks = {"render_mode": render_mode, "render_size": render_size}
+        EzPickle.__init__(self, task, drives=drives, base=base, **looks, **fields)
+        self.render_mode = render_mode
         self.task = task_options(task, fields)
         self.batch = Batch(1, self.task, drives=drives, base=base)
         self.observation_space = observation_space(self.batch)
         self.action_space = action_space(self.batch)
+        self.metadata = self.metadata | {"render_fps": frames_per_second(self.batch)}
+        self._pictures = pictures_of(self.batch, render_mode, render_size)
         self._all = np.ones(1, dtype=bool)
         self._seeded = False
 
@@ -83,6 +103,8 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         drive = (options or {}).get("drive")
         self.batch.begin(self._all, None if drive is None else self.batch.drive_indices(drive))
         self.batch.observe(self._all)
+        if self._pictures is not None:
+            self._pictures.begin(self._all)
         state = self.batch.simulator.state[0]
         where = int(self.batch.simulator.drive_of[0])
         info = {"drive": where, "time": float(self.batch.drives[where].time[state["sample"]])}
@@ -103,6 +125,8 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         batch.step()
         info: dict[str, Any] = dict(zip(TERMS, batch.arrays.terms.pull()[0].tolist(), strict=True))
         info["clipped"] = int(batch.clipped[0])
+        if self._pictures is not None:
+            self._pictures.follow(self._all)
         return (
             batch.arrays.observation.pull()[0].copy(),
             float(batch.arrays.reward.pull()[0]),
@@ -110,6 +134,21 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
             bool(batch.arrays.truncated.pull()[0]),
             info,
         )
+
+    def render(self) -> Picture | None:
+        """The machine now, beside the cues wanted and felt.
+
+        Returns:
+            In the mode "rgb_array" a frame (height, width, 3), read-only, at most 1/30 s old; else None.
+            In the mode "human" steps show themselves.
+        """
+        frames = rendered(self._pictures)
+        return None if frames is None else frames[0]
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._pictures is not None:
+            self._pictures.close()
 
 
 def normalised(acceleration: ArrayLike, scale: NDArray[np.float64]) -> Action:

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from gymnasium import logger
 from gymnasium.spaces import Box, Space
 
 from ..errors import ConfigurationError
 from ..settings import from_dict
 from .batch import Batch
 from .options import TaskOptions
+
+if TYPE_CHECKING:
+    from ..rendering.renderer import Picture
+    from .pictures import Pictures
+
+RENDER_MODES: Final = ("human", "rgb_array")
+"""What ``render_mode`` may be, beside None."""
 
 
 def observation_space(batch: Batch) -> Space[Any]:
@@ -35,13 +43,32 @@ def task_options(task: TaskOptions | None, fields: dict[str, Any]) -> TaskOption
     return from_dict(TaskOptions, start | fields, "environment options")
 
 
-def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
-    """``mode``, if an environment with this metadata has it.
+def pictures_of(batch: Batch, mode: str | None, size: tuple[int, int] | None) -> Pictures | None:
+    """What draws a batch; None without a render mode, and then nothing that draws is imported.
 
     Raises:
-        ConfigurationError: it has not.
+        ConfigurationError: there is no such mode, or ``size`` cannot be drawn or is given without one.
+        RenderingUnavailableError: the extra ``render`` is not installed.
     """
-    known = metadata["render_modes"]
-    if mode is not None and mode not in known:
-        raise ConfigurationError(f"render_mode {mode!r} is none of {known}; leave it out")
-    return mode
+    if mode is None:
+        if size is not None:
+            raise ConfigurationError("render_size is of no use without a render_mode; leave it out")
+        return None
+    if mode not in RENDER_MODES:
+        raise ConfigurationError(f"render_mode {mode!r} is none of {', '.join(RENDER_MODES)}; leave it out")
+    from .pictures import Pictures
+
+    return Pictures(batch, mode, size)
+
+
+def rendered(pictures: Pictures | None) -> tuple[Picture, ...] | None:
+    """What ``render`` returns of a batch; without a render mode it warns, as Gymnasium's environments do."""
+    if pictures is None:
+        logger.warn('render() draws nothing without a render mode; give render_mode="rgb_array" or "human"')
+        return None
+    return pictures.render()
+
+
+def frames_per_second(batch: Batch) -> float:
+    """Gymnasium's ``render_fps``: one frame a step, so that a film of all of them runs at true speed."""
+    return 1.0 / batch.time_step

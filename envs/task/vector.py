@@ -12,11 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..cues import CueTrace
 from ..errors import ConfigurationError
+from ..simulator import TIME_STEP
 from .batch import Batch
-from .environment import normalised
+from .environment import Picture, normalised
 from .options import TaskOptions
 from .reward_kernel import TERMS
-from .spaces import action_space, checked_render_mode, observation_space, task_options
+from .spaces import (
+    RENDER_MODES,
+    action_space,
+    frames_per_second,
+    observation_space,
+    pictures_of,
+    rendered,
+    task_options,
+)
 
 Mask = NDArray[np.bool_]
 Info = dict[str, Any]
@@ -34,14 +43,20 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         autoreset_mode: When an ended environment begins anew; Gymnasium's default is with the next step.
         copy: Whether observations are copies; else each step overwrites those of the one before.
         device: "cpu" or a CUDA device of Warp.
-        render_mode: One of ``metadata["render_modes"]``, or None.
+        render_mode: "rgb_array" (:meth:`render` gives a frame of each environment), "human" (a window that
+            shows the first one, at the pace of the drive), or None; see ``docs/rendering.md``.
+        render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 
     Raises:
         ConfigurationError: an option is unknown, of the wrong type or out of range.
+        RenderingUnavailableError: ``render_mode`` is given, and the extra ``render`` is not installed.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  (as Gymnasium declares it)
+    metadata: dict[str, Any] = {  # noqa: RUF012  (as Gymnasium declares it)
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 1.0 / TIME_STEP,
+    }
 
     def __init__(
         self,
@@ -54,10 +69,11 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         copy: bool = True,
         device: str = "cpu",
         render_mode: str | None = None,
+        render_size: tuple[int, int] | None = None,
         **fields: Any,
     ) -> None:
         super().__init__()
-        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        self.render_mode = render_mode
         self.task = task_options(task, fields)
         self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
         self.num_envs = num_envs
@@ -66,7 +82,9 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        told = {"render_fps": frames_per_second(self.batch), "autoreset_mode": self.autoreset_mode}
+        self.metadata = self.metadata | told
+        self._pictures = pictures_of(self.batch, render_mode, render_size)
         self._copy = copy
         self._ended = np.zeros(num_envs, dtype=bool)
         self._seeded = False
@@ -101,7 +119,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         self._seed(mask, seed)
         drive = (options or {}).get("drive")
         self.batch.begin(mask, None if drive is None else self.batch.drive_indices(drive))
-        self.batch.observe(mask)
+        self._observe(mask)
         self._ended[mask] = False
         return self._observations(), self._begun(mask)
 
@@ -151,6 +169,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
     def _step_or_begin(self) -> Result:
         """Environments that ended in the last step begin anew in this one, and ignore its action."""
         batch, began = self.batch, self._ended
+        self._follow(~began)
         reward, terminated, truncated = self._outcome()
         anything = bool(began.any())
         if anything:
@@ -158,7 +177,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         info = self._stepped(~began)
         if anything:
             batch.begin(began)
-            batch.observe(began)
+            self._observe(began)
             info |= self._begun(began)
         self._ended = terminated | truncated
         return self._observations(), reward, terminated, truncated, info
@@ -166,15 +185,40 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
     def _step_and_begin(self) -> Result:
         """Environments that end in this step begin anew in it, and tell their end in ``info``."""
         batch = self.batch
+        self._follow(np.ones(self.num_envs, dtype=bool))
         reward, terminated, truncated = self._outcome()
         ended = terminated | truncated
         if self.autoreset_mode == AutoresetMode.DISABLED or not ended.any():
             return self._observations(), reward, terminated, truncated, self._stepped(~np.zeros_like(ended))
         info = self._stepped(~ended) | self._final(ended)
         batch.begin(ended)
-        batch.observe(ended)
+        self._observe(ended)
         info |= self._begun(ended)
         return self._observations(), reward, terminated, truncated, info
+
+    def render(self) -> tuple[Picture, ...] | None:
+        """The machines now, beside the cues wanted and felt.
+
+        Returns:
+            In the mode "rgb_array" a frame of each environment, as :meth:`DrivingSimulator.render`; else
+            None. In the mode "human" steps show themselves.
+        """
+        return rendered(self._pictures)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window, if there is one."""
+        if self._pictures is not None:
+            self._pictures.close()
+
+    def _follow(self, mask: Mask) -> None:
+        if self._pictures is not None:
+            self._pictures.follow(mask)
+
+    def _observe(self, begins: Mask) -> None:
+        """Make the observations new, and the pictures, where episodes begin."""
+        self.batch.observe(begins)
+        if self._pictures is not None:
+            self._pictures.begin(begins)
 
     def _observations(self) -> NDArray[np.float32]:
         view = self.batch.arrays.observation.pull()

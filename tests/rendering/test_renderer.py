@@ -13,6 +13,7 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import Platform, get_platform, platform_names
 from motion_cueing.envs.rendering import CueHistory, Renderer, RenderingUnavailableError, theme
 from motion_cueing.envs.rendering.backend import load
+from motion_cueing.envs.rendering.gauges import signed
 from motion_cueing.envs.rendering.motion_view import head
 from motion_cueing.envs.rendering.panel import PANEL_WIDTH, shortened
 from motion_cueing.envs.rendering.scene import Scene
@@ -208,3 +209,11 @@ class TestWindow:
         renderer.show(frame, rate=1000.0)
         renderer.show(frame, rate=1000.0)
         assert not pygame.display.get_init()
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "words"),
+    [(-0.04, 1, "+0.0"), (-0.0, 0, "+0"), (-0.06, 1, "−0.1"), (2.346, 2, "+2.35"), (-12.0, 0, "−12")],
+)
+def test_numbers_that_round_to_zero_have_one_sign(value, digits, words):
+    assert signed(value, digits) == words
