@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
-from motion_cueing.baselines.washout import HighPass, load_washout
 from motion_cueing.envs.car import get_maneuver, maneuver_names
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector
+from motion_cueing.envs.task.options import RewardWeights
+from motion_cueing.envs.task.reward_kernel import N_TERMS, TERMS
 from motion_cueing.evaluation import rollout
 
 from .tasks import drive
 
-# EST1 begins off the middle; from neutral, where an episode begins, it needs stronger high-passes.
-CENTRED = replace(
-    load_washout("est1"),
-    hps=(HighPass(2, 0.12),) * 2,
-    hpi=(HighPass(1, 0.15), HighPass(1, 0.15), HighPass(2, 2.0)),
-    start_carriage=(0.0, 0.0),
-)
 POLICIES = {
     "no-motion": NoMotion(),
     "classical": ClassicalWashout("classical"),
-    "est1": ClassicalWashout(CENTRED),
+    "est1": ClassicalWashout("est1"),
     "brk": ClassicalWashout("brk"),
 }
 
@@ -41,14 +34,15 @@ def headline(state: np.ndarray) -> np.ndarray:
     return np.sum(force**2 + rate**2, axis=1)
 
 
-def scores(policy, drives: list[CueTrace]) -> tuple[np.ndarray, np.ndarray]:
-    """J and mean reward of a policy on each drive."""
+def scores(policy, drives: list[CueTrace]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """J, mean reward and mean terms of the reward of a policy on each drive."""
     n = len(drives)
     env = DrivingSimulatorVector(n, drives=drives, autoreset_mode=AutoresetMode.DISABLED)
     observation, _ = env.reset(seed=0, options={"drive": list(range(n))})
     state, begins = None, np.ones(n, dtype=bool)
     lengths = np.array([len(drive) for drive in drives])
     costs, rewards = headline(env.batch.simulator.state), np.zeros(n)
+    terms = np.zeros((n, N_TERMS))
     for k in range(1, lengths.max()):
         seen = observation[:, :OBSERVATION_SIZE]
         acceleration, state = policy.predict(seen, state, begins, deterministic=True)
@@ -56,11 +50,12 @@ def scores(policy, drives: list[CueTrace]) -> tuple[np.ndarray, np.ndarray]:
         going, begins = k < lengths, np.zeros(n, dtype=bool)
         costs += going * headline(env.batch.simulator.state)
         rewards += going * reward
-    return costs / lengths, rewards / (lengths - 1)
+        terms += going[:, None] * env.batch.arrays.terms.pull()
+    return costs / lengths, rewards / (lengths - 1), terms / (lengths - 1)[:, None]
 
 
 @pytest.fixture(scope="module")
-def suite() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def suite() -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     drives = [get_maneuver(name).drive() for name in maneuver_names()]
     return {name: scores(policy, drives) for name, policy in POLICIES.items()}
 
@@ -73,13 +68,22 @@ def test_default_reward_ranks_policies_as_the_headline_metric_does(suite):
     by_cost = sorted(suite, key=lambda name: suite[name][0].mean())
     by_reward = sorted(suite, key=lambda name: -suite[name][1].mean())
     assert by_cost == by_reward
-    assert len({round(float(costs.mean()), 6) for costs, _ in suite.values()}) == len(POLICIES)
+    assert len({round(float(costs.mean()), 6) for costs, *_ in suite.values()}) == len(POLICIES)
 
 
 def test_default_reward_is_the_headline_metric_and_little_more(suite):
-    for costs, rewards in suite.values():
+    """A hundredth at most wherever a policy keeps off the limits, which the rest charges for."""
+    weights = RewardWeights()
+    charged = np.array([getattr(weights, name) for name in TERMS])
+    at_limits = [TERMS.index(name) for name in ("stroke", "limits", "tilt_rate")]
+    checked = 0
+    for costs, rewards, terms in suite.values():
+        assert np.allclose(-rewards, terms @ charged, rtol=1e-5)
         assert np.all(-rewards > 0.99 * costs)
-        assert np.all(-rewards < 1.01 * costs)
+        limited = (terms * charged)[:, at_limits].sum(axis=1) > 0.005 * costs
+        assert np.all((-rewards < 1.01 * costs)[~limited])
+        checked += np.sum(~limited)
+    assert checked > 0.75 * len(suite) * len(maneuver_names())
 
 
 @pytest.mark.parametrize("name", ["classical", "est2", "brk"])
