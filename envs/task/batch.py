@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -117,14 +117,23 @@ class Batch:
 
     def step(self) -> None:
         """Advance by one action, which lies in ``arrays.action``; rewards, ends and observations are new."""
-        arrays, repeat = self.arrays, self.options.action.repeat
-        if self.base.scheduled:
-            self._ask(np.clip(arrays.action.pull(), -1.0, 1.0))
+        for _ in self.play():
+            pass
+
+    def play(self) -> Iterator[int]:
+        """The same as :meth:`step`, with a stop after each time step of the action; to be run to its end."""
+        repeat, base = self.options.action.repeat, self.base
+        gains = np.clip(self.arrays.action.pull(), -1.0, 1.0) if base.scheduled else None
+        # A base policy has the machine's time step: it acts anew within an action, too.
+        within = CORE if base.residual or base.scheduled else NOTHING
         for k in range(repeat):
-            parts = NOTHING if k < repeat - 1 else CORE if self.base.residual else ALL
-            self._launches.play(k == 0, parts)
-        if self.base.residual:
-            self._ask()
+            if base.scheduled:
+                self._ask(gains)
+            self._launches.play(k == 0, within if k < repeat - 1 or base.residual else ALL)
+            if base.residual:
+                self._ask()
+            yield k
+        if base.residual:
             self._launches.look(False, FRAME)
 
     def observe(self, begins: Mask) -> None:
