@@ -44,7 +44,7 @@ class Policy(Protocol):
         ...
 
 
-def start_of(policy: Policy) -> Array:
+def start_of(policy: object) -> Array:
     """(9,) pose a policy likes to begin a drive at: its ``start`` if it has one, else neutral."""
     return np.asarray(getattr(policy, "start", np.zeros(N_AXES)), dtype=np.float64)
 

@@ -136,7 +136,7 @@ def make_plan(command: EvaluateCommand) -> Plan:
     if command.out.exists() and not command.out.is_dir():
         raise DataError(f"--out {command.out} is a file; name a folder")
     platform, car = find_platform(command.platform), find_car(command.car)
-    policies = find_policies(command.policy)
+    policies = find_policies(command.policy, platform)
     return Plan(
         maneuvers=find_maneuvers(command.maneuver, car),
         policies={label: _drive_with(name, platform, car) for label, name in policies.items()},
@@ -200,7 +200,7 @@ def file_names(labels: Iterable[str]) -> dict[str, str]:
 
 
 def _drive_with(name: str, platform: Platform, car: Car) -> Drive:
-    from ..baselines import make_policy
+    from .policies import make_policy
     from .rollout import rollout
 
     policy = make_policy(name, platform)

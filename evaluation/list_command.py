@@ -33,7 +33,6 @@ def run(command: ListCommand) -> int:
 
 def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
     """Titles, each with names and one line about each."""
-    from ..baselines import describe_policy, policy_names
     from ..envs.car import (
         car_names,
         get_car,
@@ -43,6 +42,7 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
         recording_names,
     )
     from ..envs.platform import get_platform, platform_names
+    from .policies import describe_policy, policy_names
 
     return [
         ("Policies", [(name, describe_policy(name)) for name in policy_names()]),

@@ -76,7 +76,7 @@ def run(command: RenderCommand) -> int:
 
 def drive(command: RenderCommand) -> Trajectory:
     """The drive a command asks for."""
-    from ..baselines import make_policy
+    from .policies import make_policy
     from .rollout import rollout
 
     platform, car = find_platform(command.platform), find_car(command.car)
@@ -84,7 +84,7 @@ def drive(command: RenderCommand) -> Trajectory:
     if len(sources) != 1:
         raise ConfigurationError(f"--maneuver {command.maneuver} means several drives; name one")
     ((label, source),) = sources.items()
-    ((name, policy),) = find_policies((command.policy,)).items()
+    ((name, policy),) = find_policies((command.policy,), platform).items()
     trajectory = rollout(make_policy(policy, platform), source(), platform=platform, car=car)
     return replace(trajectory, maneuver=label, policy=name)
 

@@ -43,12 +43,12 @@ def find_car(name: str) -> Car:
     return get_car(name)
 
 
-def find_policies(names: Sequence[str]) -> dict[str, str]:
-    """Label and name (or file) of each policy; the default ones where none is named."""
-    from ..baselines import default_policies, policy_names
+def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
+    """Label and name (or file) of each policy; those meant for a machine where none is named."""
+    from .policies import default_policies, policy_names
 
     known = policy_names()
-    wanted = list(names) or list(default_policies())
+    wanted = list(names) or default_policies(platform)
     found = labels(wanted, [_label("policy", name, known) for name in wanted])
     return {label: name for name, label in found.items()}
 

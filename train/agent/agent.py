@@ -20,7 +20,7 @@ from ...envs.task.layout import Layout, layout_of
 from ...envs.task.library import platform_of
 from ...envs.task.options import TaskOptions
 from .contents import contents_of, network_of
-from .files import read, write
+from .files import SUFFIX, read, write
 from .network import Array, Network
 from .record import Record
 
@@ -129,8 +129,8 @@ class Agent:
         Raises:
             ConfigurationError: the file's name ends otherwise.
         """
-        if Path(path).suffix != ".safetensors":
-            raise ConfigurationError(f"{path}: an agent's file ends in .safetensors")
+        if Path(path).suffix != SUFFIX:
+            raise ConfigurationError(f"{path}: an agent's file ends in {SUFFIX}")
         base = self.base if isinstance(self.base, WashoutParameters) else None
         contents = contents_of(self.name, self.task, self.network, self.record, base)
         write(path, *contents)

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from numpy.typing import NDArray
-from pydantic.dataclasses import dataclass
 
 from ...baselines.washout import WashoutParameters
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.platform.machines import Platform
-from ...envs.settings import STRICT, Positive, from_dict, to_dict
+from ...envs.settings import Positive, configuration, from_dict, to_dict
 from ...envs.task.library import platform_of
 from ...envs.task.options import TaskOptions
 from .network import Activation, Network, Squash
@@ -23,7 +22,7 @@ _MEAN: Final = "observation.mean"
 _VARIANCE: Final = "observation.variance"
 
 
-@dataclass(frozen=True, config=STRICT)
+@configuration
 class Contents:
     """Everything in an agent's file but its arrays.
 

@@ -16,6 +16,8 @@ from safetensors.numpy import save
 from ...envs.errors import DataError
 from ...envs.storage import write_bytes
 
+SUFFIX: Final = ".safetensors"
+
 FORMAT: Final = 1
 """Version of the file; a reader refuses newer ones."""
 

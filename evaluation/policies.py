@@ -1,0 +1,58 @@
+"""Policies by name or file: baselines, washouts in YAML files, and agents."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .. import baselines
+from ..baselines import Policy
+from ..envs.errors import UnknownNameError
+from ..envs.platform import Platform
+from ..train.agent import Agent, agent_names, get_agent
+from ..train.agent.files import SUFFIX
+from .drivers import TaskPolicy, check_machine
+from .selection import is_file
+
+
+def policy_names() -> list[str]:
+    """Names :func:`make_policy` knows."""
+    return [*baselines.policy_names(), *agent_names()]
+
+
+def default_policies(platform: Platform) -> list[str]:
+    """Policies an evaluation compares unless told otherwise; the agents that were made for the machine."""
+    agents = [name for name in agent_names() if get_agent(name).platform == platform]
+    return [*baselines.default_policies(), *agents]
+
+
+def describe_policy(name: str) -> str:
+    """One line about a policy."""
+    return get_agent(name).description if name in agent_names() else baselines.describe_policy(name)
+
+
+def find_agent(name: str) -> Agent:
+    """An agent by the name of a shipped one, or by file.
+
+    Raises:
+        UnknownNameError: no agent has this name.
+        DataError: the file does not exist, is broken or no agent.
+    """
+    return Agent.load(name) if name not in agent_names() and is_file(name) else get_agent(name)
+
+
+def make_policy(name: str, platform: Platform) -> Policy | TaskPolicy:
+    """A policy for a machine, by name, or from the file of a washout or an agent.
+
+    Raises:
+        UnknownNameError: no policy has this name.
+        DataError: the file does not exist or cannot be read.
+        ConfigurationError: a field of the file is wrong, or its agent was made for another machine.
+    """
+    if name in agent_names() or Path(name).suffix == SUFFIX:
+        agent = find_agent(name)
+        check_machine(agent, platform)
+        return agent
+    try:
+        return baselines.make_policy(name, platform)
+    except UnknownNameError:
+        raise UnknownNameError("policy", name, policy_names()) from None
