@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs
 from typing_extensions import dataclass_transform
 
 from .errors import ConfigurationError, DataError, suggest
@@ -69,7 +70,7 @@ def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:
 
 def describe(error: ValidationError, cls: type[Any]) -> str:
     """One sentence a wrong field, with its path, what was found and what is allowed."""
-    return "; ".join(_describe_one(dict(item), _known_fields(cls, item["loc"])) for item in error.errors())
+    return "; ".join(_describe_one(dict(item), cls) for item in error.errors())
 
 
 def _known_fields(cls: type[Any], path: tuple[int | str, ...]) -> list[str]:
@@ -90,14 +91,25 @@ def _configurations(hint: Any) -> list[type[Any]]:
     return [found for inner in get_args(hint) for found in _configurations(inner)]
 
 
-def _describe_one(item: dict[str, Any], known: list[str]) -> str:
-    path = ".".join(str(part) for part in item["loc"]) or "value"
+def _describe_one(item: dict[str, Any], cls: type[Any]) -> str:
+    where, names = item["loc"], [field.name for field in dataclasses.fields(cls)]
+    if item["type"] == "unexpected_positional_argument":
+        return f"value number {where[0] + 1} is too many; the fields are {', '.join(names)}"
+    if where and isinstance(where[0], int):
+        # A value given by its place instead of by its name.
+        where = (names[where[0]], *where[1:])
+    path = ".".join(map(str, where))
     if item["type"] == "unexpected_keyword_argument":
-        return f"unknown field {path!r}. {suggest(path.rsplit('.')[-1], known)}"
+        return f"unknown field {path!r}. {suggest(str(where[-1]), _known_fields(cls, where))}"
     if item["type"] == "missing":
         return f"field {path!r} is missing"
+    if item["type"] == "multiple_argument_values":
+        return f"field {path!r} is given twice, by its place and by its name"
     message = str(item["msg"]).removeprefix("Value error, ")
-    return f"field {path!r}: {message} (found {item['input']!r})"
+    told = f"field {path!r}: {message}" if path else message
+    # The check of a whole configuration says itself what it found.
+    whole = item["type"] == "value_error" and isinstance(item["input"], dict | ArgsKwargs)
+    return told if whole else f"{told} (found {item['input']!r})"
 
 
 def to_dict(config: Any) -> dict[str, Any]:
@@ -114,14 +126,22 @@ def load(cls: type[T], path: str | Path) -> T:
         DataError: the file cannot be read or is not YAML.
         ConfigurationError: a field is unknown, missing or out of range.
     """
+    return from_dict(cls, read_yaml(path), str(path))
+
+
+def read_yaml(path: str | Path) -> object:
+    """The values in a YAML file.
+
+    Raises:
+        DataError: the file cannot be read or is not YAML.
+    """
     try:
         text = Path(path).read_text(encoding="utf-8")
-        values = yaml.safe_load(text)
+        return yaml.safe_load(text)
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read ({error})") from None
     except yaml.YAMLError as error:
         raise DataError(f"{path}: not YAML ({_yaml_problem(error, text)})") from None
-    return from_dict(cls, values, str(path))
 
 
 def _yaml_problem(error: yaml.YAMLError, text: str) -> str:

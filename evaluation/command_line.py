@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import io
 import os
-import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr
@@ -14,6 +13,7 @@ from importlib import import_module
 from typing import Any, Final
 
 from ..envs.errors import ConfigurationError, MotionCueingError, UnknownNameError
+from .complaint import plain_complaint
 
 PROGRAM: Final = "motion-cueing"
 SUCCESS: Final = 0
@@ -134,19 +134,8 @@ def _parse(name: str, arguments: type[Any], rest: list[str]) -> Any:
     except SystemExit as stop:
         if not stop.code:
             return SUCCESS
-        raise ConfigurationError(_one_line(name, complaint.getvalue())) from None
-
-
-def _one_line(name: str, panel: str) -> str:
-    """The sentences of tyro's framed complaint, with the names of the options it suggests."""
-    plain = re.sub(r"\x1b\[[0-9;]*m", "", panel)
-    rows = [row.strip("│╭╮╰╯─| ") for row in plain.splitlines()[1:]]
-    # Terminals without box characters get rules of ASCII; a `-` within words belongs to an option.
-    text = " ".join(row for row in rows if row.strip("+-")).split("For full helptext")[0]
-    told, _, suggested = text.partition("Perhaps you meant:")
-    near = dict.fromkeys(re.findall(r"(?<!\S)--[a-z][a-z-]*", suggested))
-    hint = f" Did you mean {' or '.join(near)}?" if near else ""
-    return f"{told.strip().rstrip('.')}.{hint} See `{PROGRAM} {name} --help`"
+        told = plain_complaint(complaint.getvalue())
+        raise ConfigurationError(f"{told} See `{PROGRAM} {name} --help`") from None
 
 
 def _refuse_repeated(arguments: type[Any], rest: list[str]) -> None:

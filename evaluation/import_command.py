@@ -6,30 +6,18 @@ import tempfile
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import ValidationError
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from ..envs.car.import_options import ImportOptions
 from ..envs.car.importing import import_log
 from ..envs.car.log_columns import parse_columns
 from ..envs.errors import ConfigurationError
-from ..envs.settings import describe
 from ..envs.storage import write_bytes
 
 _MOST_DECIMALS = 15
 """More digits than a double has are noise."""
-
-
-class TypedOptions(ImportOptions):
-    """The options as typed by a person, to whom a wrong one is told in one line."""
-
-    def __init__(self, **values: Any) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            raise ConfigurationError(describe(error, ImportOptions)) from None
 
 
 @dataclass(frozen=True)
@@ -52,7 +40,7 @@ class ImportCommand:
     """Picture (PNG) to write: cues against the car's own motion, raw signals, spectra."""
     decimals: Annotated[int | None, arg(metavar="N")] = None
     """Digits after the point in the cues; nine significant digits if not given."""
-    conversion: OmitArgPrefixes[TypedOptions] = field(default_factory=TypedOptions)
+    conversion: OmitArgPrefixes[ImportOptions] = field(default_factory=ImportOptions)
     """How the log becomes cues."""
 
 

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
+import importlib
+import inspect
+import math
 import os
+import pickle
+import pkgutil
 import resource
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import FrozenInstanceError, field
+from dataclasses import FrozenInstanceError, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import motion_cueing.baselines
+import motion_cueing.envs
+import motion_cueing.evaluation
+from motion_cueing.baselines.washout import load_washout, washout_presets
+from motion_cueing.envs.car import get_maneuver
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.platform import Turntable
 from motion_cueing.envs.settings import (
     NonNegative,
     Positive,
@@ -26,6 +39,7 @@ from motion_cueing.envs.settings import (
     to_dict,
 )
 from motion_cueing.envs.storage import replacing, write_bytes, write_text
+from motion_cueing.envs.task.options import TaskOptions
 
 
 @configuration
@@ -65,6 +79,25 @@ class Assembly:
     machine: Machine | None = None
 
 
+@configuration
+class Crate:
+    """A configuration whose fields must fit each other."""
+
+    low: NonNegative = 0.0
+    high: NonNegative = 1.0
+
+    def __post_init__(self) -> None:
+        if self.low > self.high:
+            raise ValueError(f"low must not exceed high, {self.high:g}")
+
+
+@configuration
+class Store:
+    """Such a configuration within another."""
+
+    crate: Crate = Crate()
+
+
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -79,6 +112,95 @@ def test_yaml_and_back(tmp_path: Path) -> None:
     machine = Machine(2.5, (0.1, -0.2, 1e-9), "table", Spring(3.0, 0.5))
     save(machine, tmp_path / "machine.yaml")
     assert load(Machine, tmp_path / "machine.yaml") == machine
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Machine(-1.0), r"Machine: field 'mass': Input should be greater than 0 \(found -1\.0\)"),
+        (lambda: Machine(mass=math.nan), r"Machine: field 'mass': Input should be a finite number"),
+        (lambda: Machine(), "Machine: field 'mass' is missing"),
+        (lambda: Machine(1.0, mass=2.0), "field 'mass' is given twice"),
+        (
+            lambda: Spring(1.0, 2.0, 3.0),
+            "Spring: value number 3 is too many; the fields are stiffness, damping",
+        ),
+        (lambda: Spring(stifness=1.0), r"Spring: unknown field 'stifness'\. Did you mean stiffness\?"),
+        (lambda: Machine(1.0, (0.0, math.inf, 0.0)), r"Machine: field 'offset\.1': .*finite"),
+        (lambda: Machine(1.0, spring={"damping": -2.0}), r"Machine: field 'spring\.damping': .*equal to 0"),
+        (
+            lambda: Machine(1.0, spring={"dampin": 2.0}),
+            r"Machine: unknown field 'spring\.dampin'\. Did",
+        ),
+        (lambda: replace(Machine(1.0), mass=0.0), "Machine: field 'mass': Input should be greater than 0"),
+        (lambda: replace(Machine(1.0), weight=0.0), "Machine: unknown field 'weight'"),
+        (lambda: Crate(2.0, 1.0), r"Crate: low must not exceed high, 1$"),
+        (lambda: Store(crate={"low": 2.0}), r"Store: field 'crate': low must not exceed high, 1$"),
+        (lambda: Store(crate=Crate(low=-1.0)), "Crate: field 'low': Input should be greater than or equal"),
+    ],
+)
+def test_what_is_made_in_python_is_checked_in_the_same_words(
+    make: Callable[[], object], message: str
+) -> None:
+    with pytest.raises(
+        ConfigurationError, match=f"^{message}" if message[0].isupper() else message
+    ) as caught:
+        make()
+    assert "ArgsKwargs" not in str(caught.value)
+    assert caught.value.__cause__ is None
+
+
+def test_configurations_are_values() -> None:
+    one, same, other = Machine(1.0), Machine(1, spring=Spring()), Machine(2.0)
+    assert one == same
+    assert hash(one) == hash(same)
+    assert one != other
+    assert pickle.loads(pickle.dumps(other)) == other
+    assert copy.deepcopy(other) == other
+    assert replace(one, mass=2.0) == other
+    assert list(inspect.signature(Machine).parameters) == ["mass", "offset", "kind", "spring"]
+
+
+def configurations() -> list[type[Any]]:
+    """Every configuration class of the package."""
+    modules = [
+        importlib.import_module(found.name)
+        for package in (motion_cueing.envs, motion_cueing.baselines, motion_cueing.evaluation)
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        if not found.name.endswith("__main__")
+    ]
+    found = {
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and "__pydantic_validator__" in vars(value)
+        and not inspect.isabstract(value)
+    }
+    return sorted(found, key=lambda cls: cls.__qualname__)
+
+
+def test_every_configuration_of_the_package_refuses_an_unknown_field() -> None:
+    classes = configurations()
+    assert {"Platform", "Car", "TaskOptions", "WashoutParameters", "Braking"} <= {c.__name__ for c in classes}
+    for cls in classes:
+        with pytest.raises(ConfigurationError, match=f"^{cls.__name__}: .*unknown field 'no_such_field'"):
+            cls(no_such_field=1)
+        with pytest.raises(FrozenInstanceError):
+            cls.__setattr__(object.__new__(cls), dataclasses.fields(cls)[0].name, 1)
+
+
+def test_the_configurations_of_the_package_name_what_is_wrong() -> None:
+    with pytest.raises(ConfigurationError, match=r"^Turntable: travel must contain 0, found \[1\.0, 2\.0\]$"):
+        Turntable(travel=(1.0, 2.0), velocity=1.0, acceleration=1.0)
+    with pytest.raises(ConfigurationError, match=r"^Braking: field 'deceleration': .*greater than 0"):
+        replace(get_maneuver("braking"), deceleration=-1.0)
+    with pytest.raises(
+        ConfigurationError, match=r"^TaskOptions: unknown platform 'papr'\. Did you mean paper\?"
+    ):
+        TaskOptions(platform="papr")
+    with pytest.raises(ConfigurationError, match=r"^WashoutParameters: .*'psi'"):
+        replace(load_washout(washout_presets()[0]), psi=1.0)
 
 
 def test_frozen() -> None:

@@ -7,11 +7,11 @@ what they sense and can be held beside the truth.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic.dataclasses import dataclass
 from scipy import signal
 
 from ..errors import UnknownNameError
@@ -117,7 +117,7 @@ def get_vestibular_model(name: str) -> VestibularModel:
     return _MODELS[name]
 
 
-@dataclass(frozen=True, config={"arbitrary_types_allowed": True})
+@dataclass(frozen=True)
 class DiscreteFilter:
     """x' = A x + B u, y = C x + D u, of third order; lower orders are padded with zeros.
 

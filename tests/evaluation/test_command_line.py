@@ -43,7 +43,9 @@ def simulator(monkeypatch):
 
     monkeypatch.setattr(evaluate_command, "_drive_with", drive_with)
     monkeypatch.setattr(
-        evaluate_command, "find_policies", lambda names: {n: n for n in names or ["classical", "no-motion"]}
+        evaluate_command,
+        "find_policies",
+        lambda names, platform: {n: n for n in names or ["classical", "no-motion"]},
     )
 
 
@@ -116,6 +118,9 @@ def test_a_folder_that_cannot_be_made_is_a_failure(simulator, cue_file, tmp_path
     assert "file" in said
 
 
+IMPORT = ("import", "log.csv", "--column", "time=t", "--out", "cues.csv")
+
+
 @pytest.mark.parametrize(
     ("argv", "told"),
     [
@@ -143,6 +148,20 @@ def test_a_folder_that_cannot_be_made_is_a_failure(simulator, cue_file, tmp_path
         (["evaluate", "--maneuver", "missing.csv"], "missing.csv: there is no such file"),
         (["evaluate", "--platform", "missing.yaml"], "missing.yaml: there is no such file"),
         (["evaluate", "--policy", "missing.yaml"], "missing.yaml: there is no such file"),
+        (["render", "--begin", "noon", "--out", "a.png"], "--begin takes a number, found 'noon'. See"),
+        (
+            ["render", "--size", "9", "x", "--out", "a.png"],
+            "--size takes 2 whole numbers, found '9' 'x'. See",
+        ),
+        (["render", "--out", "a.png", "--rate"], "--rate needs a value after it. See"),
+        (["render", "--begin", "1"], "render: --out must be given. See"),
+        (["render", "--camera", "3"], "render: --out must be given. Unrecognized options: --camera 3. See"),
+        (["import"], "import: PATH, --out must be given. See"),
+        ([*IMPORT, "--cutoff-hz", "low"], "import: --cutoff-hz takes a number, found 'low'. See"),
+        ([*IMPORT, "--cutoff-hz", "0"], "import: field 'cutoff_hz': Input should be greater than 0"),
+        ([*IMPORT, "--decimals", "1.5"], "--decimals takes a whole number, found '1.5'. See"),
+        ([*IMPORT, "--rate-bias-deg-s", "1", "2", "x"], "takes 3 numbers, found '1' '2' 'x'. See"),
+        ([*IMPORT, "--gaps", "jump"], "invalid choice 'jump' for argument '--gaps'"),
     ],
 )
 def test_bad_arguments_exit_2_with_one_line(argv, told, tmp_path, monkeypatch, capsys):

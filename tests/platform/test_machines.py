@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from pydantic import ValidationError
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, GeometryError, UnknownNameError
 from motion_cueing.envs.platform import (
@@ -115,7 +114,7 @@ def test_fields_out_of_range_are_named(field, value, tmp_path):
 
 @pytest.mark.parametrize("extension", [[0.1, 0.5], [-0.5, -0.1], [-3.0, 0.5]])
 def test_travel_that_leaves_out_neutral_or_the_leg_is_refused(extension, tmp_path):
-    with pytest.raises((ConfigurationError, ValidationError), match="extension"):
+    with pytest.raises(ConfigurationError, match="extension"):
         load(broken(extension=extension), tmp_path)
 
 
@@ -127,7 +126,7 @@ def test_travel_that_leaves_out_neutral_or_the_leg_is_refused(extension, tmp_pat
     ],
 )
 def test_travel_that_leaves_out_zero_is_refused(make):
-    with pytest.raises((ConfigurationError, ValidationError), match="must contain 0"):
+    with pytest.raises(ConfigurationError, match="must contain 0"):
         make()
 
 
