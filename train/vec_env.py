@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
+from ..envs.snapshot import Snapshot
 from ..envs.task.batch import Batch
 from ..envs.task.environment import normalised
 from ..envs.task.options import TaskOptions
@@ -150,6 +151,23 @@ class DrivingSimulatorVecEnv(VecEnv):
             rendered(self._pictures)
             return None
         return super().render(mode)
+
+    def snapshot(self) -> Snapshot:
+        """Everything that changes, for :meth:`restore` of environments made alike."""
+        sums = {"returns": self._returns.copy(), "sums": self._sums.copy(), "steps": self._steps.copy()}
+        return {**self.batch.snapshot(), **{f"episode.{name}": array for name, array in sums.items()}}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot: the same actions then give the same bits, without a reset.
+
+        Raises:
+            DataError: it is of another batch or version.
+        """
+        self.batch.restore(snapshot)
+        for name, array in (("returns", self._returns), ("sums", self._sums), ("steps", self._steps)):
+            array[...] = snapshot[f"episode.{name}"]
+        self._seeded = True
+        self._reset_seeds()
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -5,6 +5,7 @@ Any policy that follows Stable-Baselines3's convention can be one; this package 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConfigurationError
 from ..platform.state import AXES
+from ..snapshot import Snapshot
 from .options import Mode
 
 Array = NDArray[Any]
@@ -100,6 +102,17 @@ class Base:
         self._state = np.array(self._state)
         self._state[mask] = np.asarray(state)[mask]
         self._begins &= ~mask
+
+    def snapshot(self) -> Snapshot:
+        """The memory, for :meth:`restore`."""
+        state = {} if self._state is None else {"base_state": np.array(self._state)}
+        return {"base_begins": self._begins.copy(), **state}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot."""
+        self._begins[...] = snapshot["base_begins"]
+        state = snapshot.get("base_state")
+        self._state = None if state is None else np.array(state)
 
 
 def _check(policy: Any, mode: Mode) -> None:

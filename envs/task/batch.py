@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..cues import CueTrace
 from ..errors import ActionError, ConfigurationError, UnknownNameError
+from ..mirror import Mirror
 from ..perception.models import get_vestibular_model
 from ..simulator import TIME_STEP, Simulator
+from ..snapshot import Snapshot, bytes_of, put_bytes
 from . import draws
 from .base import Base
 from .episode import DRIVE, MACHINE, draw, fill_episodes, start_poses, start_samples
@@ -22,6 +24,9 @@ from .options import TaskOptions
 from .scaling import acceleration_scale
 
 Mask = NDArray[np.bool_]
+
+_CONSTANT: Final = ("bounds", "memory")
+"""Arrays that are what they were when the batch was made."""
 
 
 class Batch:
@@ -149,6 +154,33 @@ class Batch:
         """Let the base policy act."""
         self.base.ask(self.arrays.core.pull(), self.arrays.base.view, gains, mask)
         self.arrays.base.push()
+
+    def snapshot(self) -> Snapshot:
+        """Everything that changes, for :meth:`restore` of a batch made alike."""
+        arrays = {name: bytes_of(mirror.array) for name, mirror in self._changing()}
+        machines = {f"simulator.{name}": data for name, data in self.simulator.snapshot().items()}
+        draws_made = {"keys": self._keys.copy(), "episodes": self._episodes.copy()}
+        return {**arrays, **machines, **draws_made, **self.base.snapshot()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot: the same actions then give the same bits.
+
+        Raises:
+            DataError: it is of another batch or version.
+        """
+        for name, mirror in self._changing():
+            put_bytes(mirror.array, name, snapshot)
+            mirror.pull()
+        prefix = "simulator."
+        self.simulator.restore(
+            {name.removeprefix(prefix): data for name, data in snapshot.items() if name.startswith(prefix)}
+        )
+        self._keys[...], self._episodes[...] = snapshot["keys"], snapshot["episodes"]
+        self.base.restore(snapshot)
+
+    def _changing(self) -> list[tuple[str, Mirror]]:
+        """The arrays that change, by name."""
+        return [(name, mirror) for name, mirror in vars(self.arrays).items() if name not in _CONSTANT]
 
     @property
     def clipped(self) -> NDArray[np.int32]:

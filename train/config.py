@@ -1,0 +1,211 @@
+"""Everything that can be chosen about a training, as a frozen dataclass that loads from YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field, JsonValue
+
+from ..baselines.washout import WashoutParameters, load_washout
+from ..envs.car import drive_seeds
+from ..envs.errors import ConfigurationError
+from ..envs.settings import Positive, configuration, from_dict, read_yaml
+from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomisationOptions, TaskOptions
+from .registry import algorithm_names, get_algorithm, preset_file
+
+Measure = Literal["cue_error", "perceived_error", "reward"]
+"""What makes one agent better than another on the validation drives."""
+
+EVALUATION_ONLY: Final = (
+    "standard maneuvers and recorded drives are for evaluation and are never trained on; "
+    "leave it empty for random drives"
+)
+
+
+@configuration
+class NormalizeOptions:
+    """Running normalisation, as Stable-Baselines3's ``VecNormalize`` does it.
+
+    Args:
+        observation: Whether observations are; the agent's file holds their mean and variance.
+        reward: Whether rewards are divided by the standard deviation of the discounted return.
+        clip: Largest absolute value of either.
+    """
+
+    observation: bool = True
+    reward: bool = True
+    clip: Positive = 10.0
+
+
+@configuration
+class ValidationOptions:
+    """Random drives that are never trained on, driven whole from neutral without randomisation.
+
+    Args:
+        every: Actions between validations, over all environments.
+        drives: Their number.
+        duration: Of each, s.
+        seed: Of the drives; another one than ``task.episode.library_seed``.
+        best: What the best agent is best in.
+    """
+
+    every: PositiveCount = 100_000
+    drives: PositiveCount = 16
+    duration: Positive = 60.0
+    seed: Count = 1_000_000
+    best: Measure = "cue_error"
+
+
+@configuration
+class CheckpointOptions:
+    """What a training that was stopped goes on from.
+
+    Args:
+        every: Actions between checkpoints, over all environments; 0 for none but that of Ctrl-C.
+        keep: Checkpoints kept, the latest.
+    """
+
+    every: Count = 500_000
+    keep: PositiveCount = 2
+
+
+@configuration
+class Choice:
+    """What a search may set a field to: one of ``choices``, or a number from ``low`` to ``high``.
+
+    Args:
+        choices: Values to choose from.
+        low: Smallest number.
+        high: Largest number.
+        log: Whether numbers are drawn by their logarithm.
+        integer: Whether numbers are whole.
+    """
+
+    choices: tuple[JsonValue, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    log: bool = False
+    integer: bool = False
+
+    def __post_init__(self) -> None:
+        ranged = self.low is not None and self.high is not None
+        if bool(self.choices) == ranged or (self.low is None) != (self.high is None):
+            raise ValueError("give either choices, or low and high")
+        if self.low is not None and self.high is not None:
+            if self.low >= self.high:
+                raise ValueError(f"low must be below high, found {self.low} and {self.high}")
+            if self.log and self.low <= 0.0:
+                raise ValueError(f"log needs a low above 0, found {self.low}")
+
+
+@configuration
+class TrainingConfig:
+    """A training; with its seed it determines the agent.
+
+    Args:
+        algo: The algorithm, by name.
+        task: The environment. ``task.episode.drives`` stays empty: only random drives are trained on.
+        base: Washout under the agent, where ``task.action.mode`` needs one: its parameters, a preset or a
+            YAML file; "classical" if none is named.
+        hyperparameters: Arguments of the algorithm.
+        normalize: Running normalisation.
+        n_envs: Environments stepped together.
+        steps: Actions in all, over all environments.
+        seed: Of everything that is drawn.
+        validation: How the agent is judged meanwhile.
+        checkpoints: What a stopped training goes on from.
+        log_every: Actions between rows of the log.
+        threads: Of PyTorch.
+        device: Of network and simulation: "cpu" or "cuda:0" and the like.
+        search: What a search varies: fields by path, as ``hyperparameters.learning_rate``.
+    """
+
+    algo: str
+    task: TaskOptions = TaskOptions()
+    base: WashoutParameters | str | None = None
+    hyperparameters: dict[str, JsonValue] = field(default_factory=dict)
+    normalize: NormalizeOptions = NormalizeOptions()
+    n_envs: PositiveCount = 64
+    steps: PositiveCount = 1_000_000
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    validation: ValidationOptions = ValidationOptions()
+    checkpoints: CheckpointOptions = CheckpointOptions()
+    log_every: PositiveCount = 10_000
+    threads: PositiveCount = 1
+    device: str = "cpu"
+    search: dict[str, Choice] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        episode = self.task.episode
+        if self.algo not in algorithm_names():
+            raise ValueError(f"algo must be one of {', '.join(algorithm_names())}, found {self.algo!r}")
+        if episode.drives:
+            raise ValueError(f"task.episode.drives names {', '.join(episode.drives)}: {EVALUATION_ONLY}")
+        trained = set(drive_seeds(episode.library, episode.library_seed))
+        if trained & set(drive_seeds(self.validation.drives, self.validation.seed)):
+            raise ValueError(
+                f"validation.seed {self.validation.seed} gives drives that are trained on; "
+                "use another than task.episode.library_seed"
+            )
+
+
+def validation_task(config: TrainingConfig) -> TaskOptions:
+    """The environment of the validation drives."""
+    given = config.validation
+    episode = EpisodeOptions(
+        random=config.task.episode.random,
+        library=given.drives,
+        library_seed=given.seed,
+        drive_duration=given.duration,
+    )
+    return replace(config.task, episode=episode, randomisation=RandomisationOptions())
+
+
+def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> TrainingConfig:
+    """An algorithm's default configuration, with what a file and arguments set instead.
+
+    Args:
+        algo: The algorithm; None for the one that the file names.
+        path: YAML file with any of the fields; mappings are merged, all else replaces.
+        **fields: Fields of :class:`TrainingConfig` that go before the file; None leaves one as it is.
+
+    Raises:
+        UnknownNameError: no algorithm has this name.
+        DataError: the file cannot be read or is not YAML.
+        ConfigurationError: a field is unknown, missing or out of range.
+    """
+    given = {} if path is None else _fields(path)
+    named = given.get("algo")
+    if algo is not None and named not in (None, algo):
+        raise ConfigurationError(f"{path}: it is for algo {named}, but --algo is {algo}; leave one out")
+    name = algo or named
+    if name is None:
+        raise ConfigurationError(f"--algo is missing; use one of {', '.join(algorithm_names())}")
+    preset = _fields(preset_file(get_algorithm(str(name))))
+    chosen = {key: value for key, value in fields.items() if value is not None}
+    merged = merge(merge(preset, given), {"algo": name, **chosen})
+    config = from_dict(TrainingConfig, merged, str(path) if path is not None else f"--algo {name}")
+    if isinstance(config.base, str) and Path(config.base).suffix in (".yaml", ".yml"):
+        # The file may not be there any more when the training is resumed.
+        config = replace(config, base=load_washout(config.base))
+    return config
+
+
+def _fields(path: Path) -> dict[str, Any]:
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise ConfigurationError(f"{path}: expected fields with values, found {type(values).__name__}")
+    return values
+
+
+def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """``below`` with what ``above`` sets; mappings within are merged alike."""
+    merged = dict(below)
+    for key, value in above.items():
+        inner = merged.get(key)
+        both = isinstance(inner, Mapping) and isinstance(value, Mapping)
+        merged[key] = merge(inner, value) if both else value  # type: ignore[arg-type]
+    return merged

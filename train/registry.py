@@ -1,0 +1,93 @@
+"""The algorithms by name; each is a module that is imported only when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from ..envs.errors import ConfigurationError, UnknownNameError
+
+if TYPE_CHECKING:
+    from .config import TrainingConfig
+    from .learner import Learner
+
+_PRESETS: Final = Path(__file__).parent / "presets"
+
+
+@dataclass(frozen=True)
+class Algorithm:
+    """A way to train.
+
+    Args:
+        name: As ``--algo`` takes it.
+        module: Its module, by full name; has ``make_learner(config) -> Learner``.
+        summary: One line.
+        needs: Modules of other projects that it imports.
+        preset: YAML file with its default configuration; None for ``presets/NAME.yaml`` of this package.
+    """
+
+    name: str
+    module: str
+    summary: str
+    needs: tuple[str, ...] = ("torch", "stable_baselines3")
+    preset: Path | None = None
+
+
+_SB3: Final = "motion_cueing.train.sb3_learner"
+_CONTRIB: Final = ("torch", "stable_baselines3", "sb3_contrib")
+_ALGORITHMS: Final[dict[str, Algorithm]] = {}
+
+
+def register(algorithm: Algorithm) -> None:
+    """Add an algorithm; one with the same name is replaced."""
+    _ALGORITHMS[algorithm.name] = algorithm
+
+
+for _algorithm in (
+    Algorithm("ppo", _SB3, "proximal policy optimisation"),
+    Algorithm("sac", _SB3, "soft actor-critic"),
+    Algorithm("td3", _SB3, "twin delayed deep deterministic policy gradient"),
+    Algorithm("tqc", _SB3, "truncated quantile critics", _CONTRIB),
+):
+    register(_algorithm)
+
+
+def algorithm_names() -> list[str]:
+    """Names ``--algo`` takes."""
+    return list(_ALGORITHMS)
+
+
+def get_algorithm(name: str) -> Algorithm:
+    """An algorithm by name.
+
+    Raises:
+        UnknownNameError: no algorithm has this name.
+    """
+    if name not in _ALGORITHMS:
+        raise UnknownNameError("algorithm", name, _ALGORITHMS)
+    return _ALGORITHMS[name]
+
+
+def preset_file(algorithm: Algorithm) -> Path:
+    """The YAML file with an algorithm's default configuration."""
+    return algorithm.preset or _PRESETS / f"{algorithm.name}.yaml"
+
+
+def make_learner(config: TrainingConfig) -> Learner:
+    """The learner of a configuration.
+
+    Raises:
+        ConfigurationError: a package is missing, or a hyperparameter is wrong.
+    """
+    algorithm = get_algorithm(config.algo)
+    missing = [name for name in algorithm.needs if find_spec(name) is None]
+    if missing:
+        raise ConfigurationError(
+            f"{config.algo} needs {', '.join(missing)}: pip install 'motion-cueing-gym[train]'"
+        )
+    make: Callable[[TrainingConfig], Learner] = import_module(algorithm.module).make_learner
+    return make(config)

@@ -1,0 +1,187 @@
+"""A training from beginning or checkpoint to its end: log, validation, checkpoints, agents."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..baselines import make_policy
+from ..envs.task.library import platform_of
+from .agent import Agent, Record
+from .base_policy import DEFAULT, base_parameters
+from .interrupt import Interrupt
+from .learner import Learner, StopTraining
+from .logs import TrainingLog
+from .registry import make_learner
+from .run import RunFolder
+from .validation import Score, Validation
+
+Tell = Callable[["Status"], None]
+"""Shown the status at every boundary."""
+
+
+@dataclass
+class Status:
+    """Where a training is.
+
+    Args:
+        steps: Actions so far.
+        total: Actions in all.
+        score: Of the last validation.
+        best: Score of the best agent so far, in what the configuration calls best; lower is better.
+        reference: J of the washout on the same drives.
+        news: Whether ``score`` is new.
+    """
+
+    steps: int
+    total: int
+    score: Score | None = None
+    best: float | None = None
+    reference: float | None = None
+    news: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a training.
+
+    Args:
+        status: At the end.
+        interrupted: Whether Ctrl-C stopped it; it can be resumed.
+    """
+
+    status: Status
+    interrupted: bool
+
+
+@dataclass
+class _Clock:
+    """Wall time of all sessions, s."""
+
+    before: float = 0.0
+    begun: float = field(default_factory=time.perf_counter)
+
+    @property
+    def total(self) -> float:
+        return self.before + time.perf_counter() - self.begun
+
+
+class Training:
+    """One training in its folder.
+
+    Args:
+        run: The folder; a checkpoint in it is gone on from.
+        tell: Shown the status at every boundary.
+
+    Raises:
+        ConfigurationError: the configuration does not fit its algorithm.
+        DataError: the checkpoint is damaged.
+    """
+
+    def __init__(self, run: RunFolder, tell: Tell = lambda status: None) -> None:
+        self.run, self.config, self._tell = run, run.config, tell
+        state = run.last_checkpoint()
+        self.learner: Learner = make_learner(run.config)
+        self.validation = Validation(run.config)
+        self._clock, self._seen = _Clock(), -1
+        self._interrupt = Interrupt()
+        self.status = Status(0, run.config.steps)
+        if state is not None:
+            self._go_on(state)
+
+    def _go_on(self, state: dict[str, Any]) -> None:
+        self.learner.restore(state["learner"])
+        self._clock = _Clock(state["elapsed"])
+        self._seen = self.status.steps = self.learner.steps
+        self.status.best, self.status.reference = state["best"], state["reference"]
+
+    def train(self) -> Outcome:
+        """Train to the configuration's steps, or until Ctrl-C."""
+        self.run.begin(self.status.steps)
+        self.log = TrainingLog(self.run.path, self.status.steps)
+        try:
+            with self._interrupt.caught():
+                if self.status.reference is None:
+                    self._measure_reference()
+                self.learner.learn(self._boundary)
+                self._boundary()
+                self._finish()
+        except StopTraining:
+            return Outcome(self.status, interrupted=True)
+        finally:
+            self.log.close()
+        return Outcome(self.status, interrupted=False)
+
+    def _measure_reference(self) -> None:
+        washout = make_policy(DEFAULT, platform_of(self.config.task))
+        score = self.validation.score_policy(washout)
+        self.status.reference = score.cue_error
+        scalars = {"J": score.cue_error, "perceived_J": score.perceived_error}
+        self.log.write(0, {f"{DEFAULT}/{name}": value for name, value in scalars.items()})
+
+    def _boundary(self) -> None:
+        """Between updates: whatever is due."""
+        steps = self.status.steps = self.learner.steps
+        last = steps >= self.config.steps
+        self.status.news = False
+        if self._due(self.config.log_every) or last:
+            self.log.write(steps, self.learner.scalars())
+        if steps > self._seen and (self._due(self.config.validation.every) or last):
+            self._validate()
+        self._tell(self.status)
+        checkpoint = self.config.checkpoints.every
+        due = bool(checkpoint) and self._seen >= 0 and self._due(checkpoint)
+        self._seen = max(steps, self._seen)
+        if due or self._interrupt.asked or (last and checkpoint):
+            self.checkpoint()
+        if self._interrupt.asked and not last:
+            raise StopTraining
+
+    def _due(self, every: int) -> bool:
+        """Whether a multiple of ``every`` has been passed since the last boundary."""
+        return self._seen < 0 or self.learner.steps // every > self._seen // every
+
+    def _validate(self) -> None:
+        network, status = self.learner.network(), self.status
+        score = self.validation.score(network)
+        status.score, status.news = score, True
+        self.log.write(status.steps, score.scalars())
+        name = self.config.validation.best
+        value = -score.reward if name == "reward" else float(getattr(score, name))
+        if status.best is None or value < status.best:
+            status.best = value
+            self.agent("best").save(self.run.best_agent)
+
+    def agent(self, kind: str) -> Agent:
+        """The agent as it is now, its validation that of the last validation."""
+        config, session = self.config, self.run.sessions[-1]
+        record = Record(
+            algo=config.algo,
+            seed=config.seed,
+            command=self.run.sessions[0]["command"],
+            steps=self.learner.steps,
+            wall_time=round(self._clock.total, 1),
+            hardware=session["hardware"],
+            versions=session["versions"],
+            created=session["begun"],
+            validation=None if self.status.score is None else self.status.score.cue_error,
+        )
+        name = f"{self.run.path.resolve().name}-{kind}"
+        base = base_parameters(config.base, config.task)
+        return Agent(name, config.task, self.learner.network(), record, base)
+
+    def checkpoint(self) -> Path:
+        """Write a checkpoint of the boundary this is called at."""
+        state = {
+            "learner": self.learner.state(),
+            "elapsed": self._clock.total,
+            "best": self.status.best,
+            "reference": self.status.reference,
+        }
+        return self.run.save_checkpoint(self.status.steps, state)
+
+    def _finish(self) -> None:
+        self.agent("final").save(self.run.final_agent)
