@@ -9,8 +9,10 @@ from typing import Final
 import numpy as np
 
 from ..car import Car, drive_seeds, get_car, get_maneuver, get_recording, recording_names
-from ..car.simulation import simulate
+from ..car.maneuver import LARGEST_OFFSET
+from ..car.simulation import Plan, simulate
 from ..cues import CueTrace
+from ..errors import ConfigurationError
 from ..platform.actuators import ActuatorDynamics
 from ..platform.machines import Platform
 from ..platform.presets import get_platform
@@ -37,7 +39,7 @@ def _random_drives(episode: EpisodeOptions, randomisation: RandomisationOptions)
     for seed, factor in zip(seeds, frictions, strict=True):
         car = source.plan(seed, episode.drive_duration).car
         plans.append(source.plan(seed, episode.drive_duration, car=slippery(car, factor)))
-    return simulate(plans)
+    return _driven(plans)
 
 
 def _named_drives(episode: EpisodeOptions, randomisation: RandomisationOptions) -> list[CueTrace]:
@@ -50,7 +52,26 @@ def _named_drives(episode: EpisodeOptions, randomisation: RandomisationOptions) 
             continue
         for car in episode.random.cars:
             plans.append(get_maneuver(name).plan(slippery(get_car(car), next(frictions))))
-    return [*simulate(plans), *recordings]
+    return [*_driven(plans), *recordings]
+
+
+def _driven(plans: list[Plan]) -> list[CueTrace]:
+    """The drives that come of plans, all of them on their paths.
+
+    Raises:
+        ConfigurationError: a car came off its path; open-loop steering tests have none to come off.
+    """
+    traces = simulate(plans)
+    for plan, trace in zip(plans, traces, strict=True):
+        offset = float(np.abs(trace.channels["path_offset_m"]).max())
+        if plan.steering is None and offset > LARGEST_OFFSET:
+            car = plan.car
+            raise ConfigurationError(
+                f"{car.name} with tire friction {car.tires.friction:.2f} came {offset:.1f} m off the path of "
+                f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomisation.friction, or leave the drive "
+                "or the car out of episode"
+            )
+    return traces
 
 
 @lru_cache(maxsize=8)
@@ -58,7 +79,8 @@ def library_of(episode: EpisodeOptions, randomisation: RandomisationOptions) -> 
     """The drives that options ask for; the same options give the same drives.
 
     Raises:
-        DataError: a car left the range of its model (a friction too low for the drive).
+        ConfigurationError: a car came off its path (a friction too low for the drive).
+        DataError: a car left the range of its model.
     """
     make = _named_drives if episode.drives else _random_drives
     return tuple(make(episode, randomisation))

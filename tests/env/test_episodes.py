@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.car import RandomDrives, drive_seeds, get_maneuver, get_recording, random_drive
+from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.platform.kinematics import legs_of_pose
 from motion_cueing.envs.task import (
@@ -78,6 +79,24 @@ def test_every_car_drives_every_maneuver_and_friction_changes_the_drive():
     assert [cues.source.split(",")[0] for cues in grip] == ["sedan", "volvo-v40"]
     for a, b in zip(grip, slip, strict=True):
         assert np.abs(a.specific_force - b.specific_force).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("episode", "friction", "message"),
+    [
+        ({"drives": ["slalom"]}, 0.6, r"friction 0\.\d\d came \d+\.\d m off the path of slalom"),
+        ({"library": 40, "drive_duration": 30.0}, 0.25, "m off the path of .*-.*: raise randomisation"),
+    ],
+)
+def test_car_that_leaves_its_path_is_refused(episode, friction, message):
+    arguments = {"episode": episode, "randomisation": {"friction": (friction, friction)}}
+    with pytest.raises(ConfigurationError, match=message):
+        DrivingSimulator(**arguments)
+
+
+def test_open_loop_steering_has_no_path_to_leave():
+    drives = DrivingSimulator(episode={"drives": ["step-steer"]}).batch.drives
+    assert np.abs(drives[0].channels["path_offset_m"]).max() > 1.0
 
 
 def test_recording_too_slow_is_resampled():
