@@ -14,8 +14,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from .cues import GRAVITY
-from .platform.state import Machine
-from .precision import real
+from .platform.state import Machine, Motion
+from .precision import real, vec3, vec9
 from .state import State
 
 
@@ -97,15 +97,17 @@ def share_of_limit(value: real, lower: real, upper: real) -> real:
 
 
 @wp.func
-def write_observation(m: Machine, s: State, out: wp.array2d(dtype=real), i: int) -> int:
-    """One environment's observation, the rows in the order of :data:`ROWS`; returns its size."""
-    p = s.setpoint
-    gravity = real(wp.static(GRAVITY))
+def write_observation(
+    m: Machine, s: State, p: Motion, acceleration: vec9, out: wp.array2d(dtype=real), i: int
+) -> int:
+    """One environment's observation, the rows in the order of :data:`ROWS`; returns its size.
+
+    ``p`` are the machine's set-points and ``acceleration`` its acceleration, in the frame to be seen in.
+    """
+    gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
     one = real(1.0)
-    wanted = s.wanted.force
-    wanted[2] = wanted[2] + gravity
-    felt = s.felt.force
-    felt[2] = felt[2] + gravity
+    wanted = s.wanted.force + gravity
+    felt = s.felt.force + gravity
     k = put(out, i, 0, wanted, 3, real(wp.static(SCALES["wanted_force"])))
     k = put(out, i, k, s.wanted.rate, 3, one)
     k = put(out, i, k, felt, 3, real(wp.static(SCALES["felt_force"])))
@@ -124,7 +126,7 @@ def write_observation(m: Machine, s: State, out: wp.array2d(dtype=real), i: int)
         j = leg + 2
         out[i, k + leg] = share_of_limit(p.position[j], m.position_min[j], m.position_max[j])
         out[i, k + 6 + leg] = p.rate[j] / m.velocity[j]
-    return put(out, i, k + 12, s.acceleration, 9, real(wp.static(SCALES["acceleration"])))
+    return put(out, i, k + 12, acceleration, 9, real(wp.static(SCALES["acceleration"])))
 
 
 def observe_kernel(
@@ -135,7 +137,8 @@ def observe_kernel(
 ) -> None:
     """Observation of every environment."""
     i = wp.tid()
-    write_observation(machines[machine_of[i]], state[i], out, i)
+    s = state[i]
+    write_observation(machines[machine_of[i]], s, s.setpoint, s.acceleration, out, i)
 
 
 observe_forward = wp.kernel(observe_kernel, enable_backward=False, module="unique")

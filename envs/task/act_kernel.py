@@ -6,8 +6,9 @@ from typing import Final
 
 import warp as wp
 
+from ..platform.state import Motion
 from ..precision import real, vec9
-from ..state import State
+from .heading import to_cab, to_machine
 
 ACCELERATION = wp.constant(0)
 JERK = wp.constant(1)
@@ -28,26 +29,15 @@ class ActionScale:
     jerk: vec9  # m/s^3, rad/s^3
     velocity: vec9  # m/s, rad/s
     free: vec9  # 0 for a frozen axis, else 1
-
-
-@wp.struct
-class Command:
-    """What an environment's actions have asked for."""
-
-    acceleration: vec9
-    clipped: int  # entries of the action outside [-1, 1]
+    cab_frame: int  # whether an action is turned with the cab's heading
 
 
 @wp.func
-def axis_rate(s: State, axis: int) -> real:
-    """Speed of the set-point of an axis, in the order of ``AXES``."""
-    if axis < 2:
-        return s.setpoint.rate[axis]
-    if axis < 5:
-        return s.setpoint.velocity[axis - 2]
-    if axis < 8:
-        return s.setpoint.beta_rate[axis - 5]
-    return s.setpoint.rate[8]
+def axis_rates(m: Motion) -> vec9:
+    """Speeds in the order of ``AXES``."""
+    v = m.velocity
+    b = m.beta_rate
+    return vec9(m.rate[0], m.rate[1], v[0], v[1], v[2], b[0], b[1], b[2], m.rate[8])
 
 
 @wp.func
@@ -80,23 +70,39 @@ def take_action(
 
 
 @wp.func
-def asked_accelerations(
-    scale: ActionScale,
-    s: State,
-    now: wp.array2d(dtype=wp.float32),
-    i: int,
-    base: vec9,
-    before: vec9,
-    dt: real,
+def own_accelerations(
+    scale: ActionScale, m: Motion, now: wp.array2d(dtype=wp.float32), i: int, before: vec9, dt: real
 ) -> vec9:
-    """The accelerations an action asks for in a time step; ``before`` are those of the step before."""
-    wanted = vec9()
-    for k in range(9):
-        if scale.mode == GAINS:
-            wanted[k] = base[k]
-        else:
-            wanted[k] = asked(scale, k, real(now[i, k]), before[k], axis_rate(s, k), dt)
-        if scale.mode == RESIDUAL:
-            wanted[k] = wanted[k] + base[k]
-        wanted[k] = wanted[k] * scale.free[k]
-    return wanted
+    """The accelerations an action itself asks for in a time step, in its frame.
+
+    ``m`` are the set-points, ``before`` what was asked for in the step before.
+    """
+    if scale.mode == GAINS:
+        return vec9()
+    rates = axis_rates(m)
+    if scale.cab_frame != 0:
+        rates = to_cab(m, rates)
+    return vec9(
+        asked(scale, 0, real(now[i, 0]), before[0], rates[0], dt),
+        asked(scale, 1, real(now[i, 1]), before[1], rates[1], dt),
+        asked(scale, 2, real(now[i, 2]), before[2], rates[2], dt),
+        asked(scale, 3, real(now[i, 3]), before[3], rates[3], dt),
+        asked(scale, 4, real(now[i, 4]), before[4], rates[4], dt),
+        asked(scale, 5, real(now[i, 5]), before[5], rates[5], dt),
+        asked(scale, 6, real(now[i, 6]), before[6], rates[6], dt),
+        asked(scale, 7, real(now[i, 7]), before[7], rates[7], dt),
+        asked(scale, 8, real(now[i, 8]), before[8], rates[8], dt),
+    )
+
+
+@wp.func
+def applied_accelerations(scale: ActionScale, m: Motion, own: vec9, base: vec9) -> vec9:
+    """What the axes are told: ``own`` accelerations in the machine's frame, with the base policy's."""
+    if scale.mode == GAINS:
+        return wp.cw_mul(base, scale.free)
+    wanted = own
+    if scale.cab_frame != 0:
+        wanted = to_machine(m, own)
+    if scale.mode == RESIDUAL:
+        wanted = wanted + base
+    return wp.cw_mul(wanted, scale.free)

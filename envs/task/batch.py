@@ -20,6 +20,7 @@ from .episode import DRIVE, MACHINE, draw, fill_episodes, start_poses, start_sam
 from .launches import ALL, CORE, FRAME, NOTHING, BatchArrays, Launches, rules_of
 from .layout import layout_of
 from .library import library_of, machines_of
+from .memory import low_passed
 from .options import TaskOptions
 from .scaling import acceleration_scale
 
@@ -64,7 +65,8 @@ class Batch:
         self.base = Base(base, options.action.mode, n)
         self.action_size = self.base.action_size
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
-        self.arrays = BatchArrays(n, self.action_size, self.layout, self.simulator.device)
+        memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
+        self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
         self.scale = acceleration_scale(self.platform) * options.action.authority
         self.time_step = TIME_STEP * options.action.repeat
         self._lengths = np.array([len(drive) for drive in self.drives])
@@ -181,6 +183,11 @@ class Batch:
     def _changing(self) -> list[tuple[str, Mirror]]:
         """The arrays that change, by name."""
         return [(name, mirror) for name, mirror in vars(self.arrays).items() if name not in _CONSTANT]
+
+    @property
+    def asked(self) -> NDArray[np.float64]:
+        """(n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2."""
+        return np.array(self.arrays.command.pull()["asked"], dtype=np.float64)
 
     @property
     def clipped(self) -> NDArray[np.int32]:

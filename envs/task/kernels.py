@@ -13,7 +13,7 @@ from ..platform.state import Machine, SetPoint
 from ..precision import real, vec9
 from ..state import Drives, State
 from ..step import next_state, shift_delay
-from .act_kernel import ActionScale, asked_accelerations, take_action
+from .act_kernel import ActionScale, applied_accelerations, own_accelerations, take_action
 from .episode import Episode
 from .observe_kernel import Places, repeat_frame, shift_frames, write_frame
 from .reward_kernel import RewardScale, action_change, has_failed, terms_now, vec_terms
@@ -38,7 +38,8 @@ class Rules:
 class Command:
     """What an environment's actions have asked for."""
 
-    acceleration: vec9
+    own: vec9  # the accelerations of the action itself, in its frame
+    asked: vec9  # what the axes are told, with the base policy's, in the machine's frame
     clipped: int  # entries of the action outside [-1, 1]
 
 
@@ -58,6 +59,8 @@ class Arrays:
     terminated: wp.array(dtype=wp.bool)
     truncated: wp.array(dtype=wp.bool)
     core: wp.array2d(dtype=real)
+    fixed: wp.array2d(dtype=real)  # the fixed rows in the observation's frame
+    memory: wp.array2d(dtype=wp.float32)  # low-passed cues of every sample of every drive
     bounds: wp.array(dtype=wp.float32)  # of an observation's entries
     observation: wp.array2d(dtype=wp.float32)
 
@@ -68,9 +71,10 @@ def commanded(rules: Rules, a: Arrays, s: State, i: int, first: int) -> vec9:
     c = a.command[i]
     if first != 0:
         c.clipped = take_action(a.action, a.now, a.before, i)
-    c.acceleration = asked_accelerations(rules.action, s, a.now, i, a.base[i], c.acceleration, rules.dt)
+    c.own = own_accelerations(rules.action, s.setpoint, a.now, i, c.own, rules.dt)
+    c.asked = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
     a.command[i] = c
-    return wp.cw_mul(c.acceleration, a.episode[i].actuator_gain)
+    return wp.cw_mul(c.asked, a.episode[i].actuator_gain)
 
 
 @wp.func
@@ -99,7 +103,7 @@ def look_at(
 ) -> int:
     """Write the observation of an environment, or parts of it."""
     if parts & CORE:
-        write_observation(m, s, a.core, i)
+        write_observation(m, s, s.setpoint, s.acceleration, a.core, i)
     if parts & FRAME:
         command = a.command[i]
         shift_frames(a.observation, i, rules.places.frame)
@@ -108,11 +112,13 @@ def look_at(
             drives,
             drive,
             a.episode[i],
+            m,
             s,
-            a.core,
+            a.fixed,
             a.now,
-            command.acceleration,
+            command.own,
             a.base[i],
+            a.memory,
             a.bounds,
             a.observation,
             i,

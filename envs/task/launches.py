@@ -44,6 +44,7 @@ class BatchArrays:
         n: Environments.
         action_size: Entries of an action.
         layout: Of the observations.
+        memory: Low-passed cues of every sample of every drive, see :func:`~.memory.low_passed`.
         device: Where kernels work on them.
     """
 
@@ -56,17 +57,23 @@ class BatchArrays:
     terminated: Mirror
     truncated: Mirror
 
-    def __init__(self, n: int, action_size: int, layout: Layout, device: Any) -> None:
+    def __init__(
+        self, n: int, action_size: int, layout: Layout, memory: NDArray[np.float32], device: Any
+    ) -> None:
         for name, kind in _KINDS.items():
             setattr(self, name, Mirror(n, kind, device))
         self.action = Mirror((n, action_size), wp.float32, device)
         self.now = Mirror((n, action_size), wp.float32, device)
         self.before = Mirror((n, action_size), wp.float32, device)
         self.core = Mirror((n, OBSERVATION_SIZE), real, device)
+        self.fixed = Mirror((n, OBSERVATION_SIZE), real, device)
         self.observation = Mirror((n, layout.size), wp.float32, device)
         self.bounds = Mirror(layout.size, wp.float32, device)
         self.bounds.view[...] = layout.bounds
         self.bounds.push()
+        self.memory = Mirror(memory.shape, wp.float32, device)
+        self.memory.view[...] = memory
+        self.memory.push()
 
     def for_kernels(self) -> Any:
         """The kernels' form."""
@@ -83,17 +90,16 @@ def action_scale(platform: Platform, options: ActionOptions) -> Any:
     scale.mode = MODES[options.mode]
     scale.acceleration, scale.jerk = vec9(*largest), vec9(*largest / options.rise_time)
     scale.velocity, scale.free = vec9(*velocity_scale(platform)), vec9(*free_axes(options.frozen))
+    scale.cab_frame = int(options.frame == "cab")
     return scale
 
 
 def rules_of(options: TaskOptions, layout: Layout, platform: Platform, dt: float) -> Any:
     """What is the same for a whole batch, as the kernels read it."""
     rules: Any = Rules()
-    seen = options.observation
-    stride = max(1, round(seen.preview_spacing / dt))
     rules.action = action_scale(platform, options.action)
     rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
-    rules.places = places_of(layout, seen.preview, stride, options.randomisation)
+    rules.places = places_of(layout, options.observation, dt, options.randomisation)
     rules.share, rules.dt = 1.0 / options.action.repeat, dt
     return rules
 

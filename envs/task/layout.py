@@ -55,6 +55,11 @@ def preview_row(samples: int) -> Row:
     return Row("preview", 6 * samples, 1.0, "10 m/s^2, rad/s", "car's cues ahead, nearest first")
 
 
+def memory_row(time_constants: int) -> Row:
+    """The row of ``memory``: six low-passed cues a time constant, scaled as those of a preview."""
+    return Row("memory", 6 * time_constants, 1.0, "10 m/s^2, rad/s", "car's cues, low-passed")
+
+
 @dataclass(frozen=True)
 class Layout:
     """Where everything lies in an observation.
@@ -103,6 +108,8 @@ def layout_of(options: ObservationOptions, mode: Mode, action_size: int) -> Layo
         rows.append(BASE)
     if options.preview:
         rows.append(preview_row(options.preview))
+    if options.memory:
+        rows.append(memory_row(len(options.memory)))
     if options.perceived:
         rows += PERCEIVED
     if options.true_motion:

@@ -7,13 +7,14 @@ from typing import Any
 import warp as wp
 
 from ..cues import GRAVITY
-from ..observation import SCALES, SLICES
-from ..platform.state import Motion
+from ..observation import SCALES, SLICES, write_observation
+from ..platform.state import Machine, Motion
 from ..precision import real, vec3, vec9
 from ..state import Drives, State
 from .episode import Episode
+from .heading import motion_in_cab, to_cab
 from .layout import Layout
-from .options import RandomisationOptions
+from .options import ObservationOptions, RandomisationOptions
 
 FORCE = wp.constant(real(SCALES["wanted_force"]))
 CARRIAGE = wp.constant(real(SCALES["carriage"]))
@@ -36,98 +37,156 @@ class Places:
     command: int
     base_action: int
     preview: int
+    memory: int
     perceived: int
     true_motion: int
     preview_samples: int
     preview_stride: int  # time steps between samples
+    cab_frame: int  # whether the machine's rows are turned with the cab's heading
     force_noise: real  # m/s^2
     rate_noise: real  # rad/s
 
 
-def places_of(layout: Layout, samples: int, stride: int, noise: RandomisationOptions) -> Any:
+def places_of(layout: Layout, seen: ObservationOptions, dt: float, noise: RandomisationOptions) -> Any:
     """The kernel's form of a layout."""
     places: Any = Places()
     places.frame = layout.frame
-    for name in ("force_error", "rate_error", "last_action", "command", "base_action", "preview"):
+    for name in ("force_error", "rate_error", "last_action", "command", "base_action", "preview", "memory"):
         setattr(places, name, layout.first(name))
     places.perceived, places.true_motion = layout.first("sensed_wanted_force"), layout.first("true_carriage")
-    places.preview_samples, places.preview_stride = samples, stride
+    places.preview_samples = seen.preview
+    places.preview_stride = max(1, round(seen.preview_spacing / dt))
+    places.cab_frame = int(seen.frame == "cab")
     places.force_noise, places.rate_noise = noise.force_noise, noise.rate_noise
     return places
 
 
 @wp.func
+def put_entry(
+    out: wp.array2d(dtype=wp.float32), i: int, k: int, value: real, bounds: wp.array(dtype=wp.float32)
+) -> int:
+    """Write an entry, clipped to its bound."""
+    # Once only: an entry that is written twice would count twice in the adjoint.
+    out[i, k] = wp.clamp(wp.float32(value), -bounds[k], bounds[k])
+    return k + 1
+
+
+@wp.func
 def put_vector(
-    out: wp.array2d(dtype=wp.float32), i: int, first: int, value: Any, size: int, scale: real
+    out: wp.array2d(dtype=wp.float32),
+    i: int,
+    first: int,
+    value: Any,
+    size: int,
+    scale: real,
+    bounds: wp.array(dtype=wp.float32),
 ) -> int:
     """Write ``size`` entries from ``first`` on; returns where the next row begins."""
     for k in range(size):
-        out[i, first + k] = wp.float32(value[k] / scale)
+        put_entry(out, i, first + k, value[k] / scale, bounds)
     return first + size
 
 
 @wp.func
-def put_cues(out: wp.array2d(dtype=wp.float32), i: int, first: int, force: vec3, rate: vec3) -> int:
+def put_cues(
+    out: wp.array2d(dtype=wp.float32),
+    i: int,
+    first: int,
+    force: vec3,
+    rate: vec3,
+    bounds: wp.array(dtype=wp.float32),
+) -> int:
     """Write specific force, gravity at rest taken off z, and angular velocity."""
-    lifted = vec3(force[0], force[1], force[2] + real(wp.static(GRAVITY)))
-    k = put_vector(out, i, first, lifted, 3, FORCE)
-    return put_vector(out, i, k, rate, 3, real(1.0))
+    lifted = force + vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
+    k = put_vector(out, i, first, lifted, 3, FORCE, bounds)
+    return put_vector(out, i, k, rate, 3, real(1.0), bounds)
 
 
 @wp.func
-def put_motion(out: wp.array2d(dtype=wp.float32), i: int, first: int, motion: Motion) -> int:
+def put_motion(
+    out: wp.array2d(dtype=wp.float32), i: int, first: int, m: Motion, bounds: wp.array(dtype=wp.float32)
+) -> int:
     """Write the rows of the true motion."""
     one = real(1.0)
-    k = put_vector(out, i, first, motion.position, 2, CARRIAGE)
-    k = put_vector(out, i, k, motion.rate, 2, CARRIAGE_RATE)
-    k = put_vector(out, i, k, motion.displacement, 3, one)
-    k = put_vector(out, i, k, motion.velocity, 3, one)
-    k = put_vector(out, i, k, motion.beta, 3, one)
-    k = put_vector(out, i, k, motion.beta_rate, 3, one)
-    out[i, k] = wp.float32(wp.sin(motion.position[8]))
-    out[i, k + 1] = wp.float32(wp.cos(motion.position[8]))
-    out[i, k + 2] = wp.float32(motion.rate[8])
-    return k + 3
+    k = put_vector(out, i, first, m.position, 2, CARRIAGE, bounds)
+    k = put_vector(out, i, k, m.rate, 2, CARRIAGE_RATE, bounds)
+    k = put_vector(out, i, k, m.displacement, 3, one, bounds)
+    k = put_vector(out, i, k, m.velocity, 3, one, bounds)
+    k = put_vector(out, i, k, m.beta, 3, one, bounds)
+    k = put_vector(out, i, k, m.beta_rate, 3, one, bounds)
+    k = put_entry(out, i, k, wp.sin(m.position[8]), bounds)
+    k = put_entry(out, i, k, wp.cos(m.position[8]), bounds)
+    return put_entry(out, i, k, m.rate[8], bounds)
 
 
 @wp.func
-def put_sensed_cab(
+def put_fixed(
     p: Places,
     e: Episode,
     sample: int,
-    core: wp.array2d(dtype=real),
+    fixed: wp.array2d(dtype=real),
+    bounds: wp.array(dtype=wp.float32),
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """Write the cab's cues as its sensors tell them, and the car's minus them."""
+    """Write the fixed rows, the cab's cues as its sensors tell them, and the car's minus them."""
     # A generator of its own for each sample: what is seen does not depend on how often it is looked at.
     random = wp.rand_init(e.noise, sample)
     noisy = p.force_noise + p.rate_noise > real(0.0)
+    for k in range(FELT_FORCE):
+        put_entry(out, i, k, fixed[i, k], bounds)
     for k in range(3):
-        force = core[i, FELT_FORCE + k] * e.force_gain
-        rate = core[i, FELT_RATE + k] * e.rate_gain
+        force_noise = real(0.0)
+        rate_noise = real(0.0)
         if noisy:
-            force = force + p.force_noise / FORCE * real(wp.randn(random))
-            rate = rate + p.rate_noise * real(wp.randn(random))
-        out[i, FELT_FORCE + k] = wp.float32(force)
-        out[i, FELT_RATE + k] = wp.float32(rate)
-        out[i, p.force_error + k] = wp.float32(core[i, WANTED_FORCE + k] - force)
-        out[i, p.rate_error + k] = wp.float32(core[i, WANTED_RATE + k] - rate)
+            force_noise = p.force_noise / FORCE * real(wp.randn(random))
+            rate_noise = p.rate_noise * real(wp.randn(random))
+        force = fixed[i, FELT_FORCE + k] * e.force_gain + force_noise
+        rate = fixed[i, FELT_RATE + k] * e.rate_gain + rate_noise
+        put_entry(out, i, FELT_FORCE + k, force, bounds)
+        put_entry(out, i, FELT_RATE + k, rate, bounds)
+        put_entry(out, i, p.force_error + k, fixed[i, WANTED_FORCE + k] - force, bounds)
+        put_entry(out, i, p.rate_error + k, fixed[i, WANTED_RATE + k] - rate, bounds)
+    for k in range(FELT_RATE + 3, fixed.shape[1]):
+        put_entry(out, i, k, fixed[i, k], bounds)
     return 0
 
 
 @wp.func
 def put_preview(
-    p: Places, drives: Drives, drive: int, sample: int, out: wp.array2d(dtype=wp.float32), i: int
+    p: Places,
+    drives: Drives,
+    drive: int,
+    sample: int,
+    bounds: wp.array(dtype=wp.float32),
+    out: wp.array2d(dtype=wp.float32),
+    i: int,
 ) -> int:
     """Write the car's cues ahead, the last one of the drive after its end."""
-    k = p.preview
     first = drives.first[drive]
     last = drives.length[drive] - 1
     for j in range(p.preview_samples):
         ahead = first + wp.min(sample + (j + 1) * p.preview_stride, last)
-        k = put_cues(out, i, k, drives.force[ahead], drives.rate[ahead])
-    return k
+        put_cues(out, i, p.preview + 6 * j, drives.force[ahead], drives.rate[ahead], bounds)
+    return 0
+
+
+@wp.func
+def put_memory(
+    p: Places,
+    drives: Drives,
+    drive: int,
+    sample: int,
+    memory: wp.array2d(dtype=wp.float32),
+    bounds: wp.array(dtype=wp.float32),
+    out: wp.array2d(dtype=wp.float32),
+    i: int,
+) -> int:
+    """Write the low-passed cues of the car."""
+    row = drives.first[drive] + wp.min(sample, drives.length[drive] - 1)
+    for k in range(memory.shape[1]):
+        put_entry(out, i, p.memory + k, real(memory[row, k]), bounds)
+    return 0
 
 
 @wp.func
@@ -148,37 +207,55 @@ def repeat_frame(out: wp.array2d(dtype=wp.float32), i: int, frame: int) -> int:
 
 
 @wp.func
+def seen_motion(p: Places, m: Motion) -> Motion:
+    """A motion in the frame of the observation."""
+    if p.cab_frame != 0:
+        return motion_in_cab(m)
+    return m
+
+
+@wp.func
+def seen_axes(p: Places, m: Motion, v: vec9) -> vec9:
+    """Values of the axes in the frame of the observation."""
+    if p.cab_frame != 0:
+        return to_cab(m, v)
+    return v
+
+
+@wp.func
 def write_frame(
     p: Places,
     drives: Drives,
     drive: int,
     e: Episode,
+    machine: Machine,
     s: State,
-    core: wp.array2d(dtype=real),
+    fixed: wp.array2d(dtype=real),
     now: wp.array2d(dtype=wp.float32),
     command: vec9,
     base: vec9,
+    memory: wp.array2d(dtype=wp.float32),
     bounds: wp.array(dtype=wp.float32),
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """The newest frame of an environment's observation; ``core`` are its fixed rows."""
-    for k in range(core.shape[1]):
-        out[i, k] = wp.float32(core[i, k])
-    put_sensed_cab(p, e, s.sample, core, out, i)
+    """The newest frame of an environment's observation; ``fixed`` gets the fixed rows it is made of."""
+    seen = seen_motion(p, s.setpoint)
+    write_observation(machine, s, seen, seen_axes(p, s.setpoint, s.acceleration), fixed, i)
+    put_fixed(p, e, s.sample, fixed, bounds, out, i)
     for k in range(now.shape[1]):
-        out[i, p.last_action + k] = now[i, k]
+        put_entry(out, i, p.last_action + k, real(now[i, k]), bounds)
     if p.command >= 0:
-        put_vector(out, i, p.command, command, 9, ACCELERATION)
+        put_vector(out, i, p.command, command, 9, ACCELERATION, bounds)
     if p.base_action >= 0:
-        put_vector(out, i, p.base_action, base, 9, ACCELERATION)
+        put_vector(out, i, p.base_action, seen_axes(p, s.setpoint, base), 9, ACCELERATION, bounds)
     if p.preview >= 0:
-        put_preview(p, drives, drive, s.sample, out, i)
+        put_preview(p, drives, drive, s.sample, bounds, out, i)
+    if p.memory >= 0:
+        put_memory(p, drives, drive, s.sample, memory, bounds, out, i)
     if p.perceived >= 0:
-        k = put_cues(out, i, p.perceived, s.sensed_wanted.force, s.sensed_wanted.rate)
-        put_cues(out, i, k, s.sensed_felt.force, s.sensed_felt.rate)
+        k = put_cues(out, i, p.perceived, s.sensed_wanted.force, s.sensed_wanted.rate, bounds)
+        put_cues(out, i, k, s.sensed_felt.force, s.sensed_felt.rate, bounds)
     if p.true_motion >= 0:
-        put_motion(out, i, p.true_motion, s.motion)
-    for k in range(p.frame):
-        out[i, k] = wp.clamp(out[i, k], -bounds[k], bounds[k])
+        put_motion(out, i, p.true_motion, seen_motion(p, s.motion), bounds)
     return p.frame

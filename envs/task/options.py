@@ -21,6 +21,7 @@ Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
+Frame = Literal["machine", "cab"]
 
 
 def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
@@ -46,6 +47,10 @@ class ObservationOptions:
         true_motion: Whether the machine's true motion is added; it differs from the set-points where
             actuators lag.
         stack: Observations in one, the newest first; 1 for no stacking.
+        memory: Time constants of first-order low-passes of the car's cues, s: what a policy without a memory
+            of its own knows of the past.
+        frame: Axes of the machine's rows: "machine", or "cab": turned with the cab's heading, so that what
+            is ahead of the driver looks the same wherever the turntable stands.
     """
 
     preview: Count = 0
@@ -53,6 +58,8 @@ class ObservationOptions:
     perceived: bool = False
     true_motion: bool = False
     stack: PositiveCount = 1
+    memory: tuple[Positive, ...] = ()
+    frame: Frame = "machine"
 
 
 @configuration
@@ -67,6 +74,7 @@ class ActionOptions:
         rise_time: Time in which full jerk takes an acceleration from zero to its largest value, s.
         frozen: Axes that do not move, by name.
         repeat: Time steps for which an action is held; rewards are averaged over them.
+        frame: Axes of carriage, displacement and tilt: "machine", or "cab": turned with the cab's heading.
     """
 
     mode: Mode = "acceleration"
@@ -74,6 +82,7 @@ class ActionOptions:
     rise_time: Positive = 0.2
     frozen: tuple[str, ...] = ()
     repeat: PositiveCount = 1
+    frame: Frame = "machine"
 
     def __post_init__(self) -> None:
         _check_names("axis", self.frozen, AXES)

@@ -17,6 +17,7 @@ from motion_cueing.envs.task.layout import (
     PERCEIVED,
     TRUE_MOTION,
     last_action_row,
+    memory_row,
     preview_row,
 )
 
@@ -122,6 +123,82 @@ def test_true_motion_is_behind_the_set_points_where_actuators_lag():
             assert not close(row(env, observation, name.removeprefix("true_")), values), name
 
 
+def turned(vector: np.ndarray, angle: float) -> np.ndarray:
+    """A vector in axes turned by ``angle``, by complex numbers."""
+    z = (vector[0] + 1j * vector[1]) * np.exp(-1j * angle)
+    return np.array([z.real, z.imag])
+
+
+def turn(env: DrivingSimulator, angle: float) -> None:
+    """Begin an episode with the turntable at an angle."""
+    env.reset(seed=0)
+    start = np.zeros((1, 9))
+    start[0, 8] = angle
+    env.batch.simulator.place(np.ones(1, dtype=bool), start=start)
+
+
+def test_in_the_cabs_frame_the_machines_rows_turn_with_the_driver():
+    seen = ObservationOptions(frame="cab", true_motion=True)
+    env = DrivingSimulator(drives=[drive()], observation=seen, randomisation=LAG)
+    turn(env, 1.2)
+    for k in range(50):
+        observation, *_ = env.step(0.1 * np.sin(0.1 * k + np.arange(9)))
+    state = env.batch.simulator.state[0]
+    for prefix, motion in (("", state["setpoint"]), ("true_", state["motion"])):
+        psi_t = motion["position"][8]
+        psi = psi_t + motion["beta"][2]
+        assert abs(psi_t) > 1.0
+        for name, values, angle in (
+            ("carriage", motion["position"][:2], psi),
+            ("carriage_rate", motion["rate"][:2], psi),
+            ("displacement", motion["displacement"], psi),
+            ("velocity", motion["velocity"], psi),
+            ("beta", motion["beta"], psi_t),
+            ("beta_rate", motion["beta_rate"], psi_t),
+        ):
+            shown = row(env, observation, prefix + name)
+            assert close(shown[:2], turned(values, angle)), name
+            assert close(shown[2:], values[2:]), name
+    felt = state["felt"]["force"] + GRAVITY
+    assert close(row(env, observation, "felt_force"), felt)
+
+
+@pytest.mark.parametrize("mode", ["acceleration", "jerk", "velocity"])
+def test_an_action_in_the_cabs_frame_moves_the_machine_the_same_way_from_any_heading(mode):
+    """Equivariance: a turned start turns the whole motion, and the driver feels the same."""
+    options = {
+        "action": ActionOptions(mode=mode, frame="cab"),
+        "observation": ObservationOptions(frame="cab"),
+    }
+    seen, felt = [], []
+    for angle in (0.0, 2.1):
+        env = DrivingSimulator(drives=[drive()], **options)
+        turn(env, angle)
+        for k in range(60):
+            observation, *_ = env.step(0.02 * np.sin(0.1 * k + np.arange(9)))
+        seen.append([row(env, observation, n) for n in ("carriage", "displacement", "beta", "velocity")])
+        felt.append(env.batch.simulator.state["felt"]["force"][0].copy())
+    assert np.abs(seen[0][0]).max() > 0.001
+    for a, b in zip(*seen, strict=True):
+        assert np.allclose(a, b, atol=1e-5)
+    # Roll and pitch do not commute: the frames agree to first order in the tilt.
+    assert np.allclose(felt[0], felt[1], atol=1e-3)
+
+
+def test_memory_is_the_low_passed_past_of_the_car():
+    constants, steps = (0.3, 4.0), 50
+    env, observation = moved(steps, observation=ObservationOptions(memory=constants))
+    cues = env.batch.drives[0]
+    inputs = np.hstack([cues.specific_force + GRAVITY, cues.angular_velocity])
+    expected = []
+    for time_constant in constants:
+        y = inputs[0].copy()
+        for u in inputs[1 : steps + 1]:
+            y += (1.0 - np.exp(-0.01 / time_constant)) * (u - y)
+        expected.append(y / np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]))
+    assert close(row(env, observation, "memory"), np.concatenate(expected))
+
+
 def test_stack_holds_earlier_observations_the_newest_first():
     arguments = {"drives": [drive()], "seed": 0}
     stacked = DrivingSimulator(drives=arguments["drives"], observation=ObservationOptions(stack=3))
@@ -136,9 +213,7 @@ def test_stack_holds_earlier_observations_the_newest_first():
 
 def test_command_and_base_action_are_shown_where_the_mode_needs_them():
     env, observation = moved(action=ActionOptions(mode="jerk"))
-    assert close(
-        row(env, observation, "command"), env.batch.arrays.command.view["acceleration"][0].astype(np.float32)
-    )
+    assert close(row(env, observation, "command"), env.batch.arrays.command.view["own"][0].astype(np.float32))
     policy = ClassicalWashout()
     env, observation = moved(0, action=ActionOptions(mode="residual"), base=ClassicalWashout())
     expected, _ = policy.predict(env.batch.arrays.core.view[0])
@@ -179,10 +254,20 @@ def documented_rows() -> list[tuple[str, ...]]:
 
 
 def test_page_tells_every_row_as_it_is():
-    rows = [*ROWS, *DIFFERENCE, last_action_row(9), COMMAND, BASE, preview_row(1), *PERCEIVED, *TRUE_MOTION]
+    rows = [
+        *ROWS,
+        *DIFFERENCE,
+        last_action_row(9),
+        COMMAND,
+        BASE,
+        preview_row(1),
+        memory_row(1),
+        *PERCEIVED,
+        *TRUE_MOTION,
+    ]
     expected = []
     for r in rows:
-        size = "6 each" if r.name == "preview" else str(r.size)
+        size = "6 each" if r.name in ("preview", "memory") else str(r.size)
         expected.append((r.name, size, r.unit, f"{r.scale:g}", f"{r.bound:g}"))
     assert documented_rows() == expected
 
