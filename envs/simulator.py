@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from .cues import CueTrace
+from .devices import find_device
 from .errors import ActionError, ConfigurationError, DataError
 from .mirror import Mirror
 from .perception.filters import Vestibular, vestibular_parameters
@@ -19,7 +20,6 @@ from .platform.machines import Platform
 from .platform.parameters import dead_steps, machine_parameters
 from .platform.state import ACTUATORS, Machine, SetPoint
 from .precision import FLOAT, real, vec3, vec9
-from .snapshot import Snapshot, bytes_of, put_bytes
 from .state import Drives, State
 from .step import reset_forward, step_forward
 
@@ -49,7 +49,7 @@ class Simulator:
         device: Where the arrays live: "cpu" or a CUDA device of Warp.
 
     Raises:
-        ConfigurationError: an index is out of range, or nothing to simulate is given.
+        ConfigurationError: an index is out of range, nothing to simulate is given, or the device is unknown.
         DataError: a drive has another time step.
     """
 
@@ -71,7 +71,7 @@ class Simulator:
         if not (np.isfinite(dt) and dt > 0.0):
             raise ConfigurationError(f"dt must be a positive time step in seconds, found {dt}")
         self.dt = dt
-        self.device = wp.get_device(device)
+        self.device = find_device(device)
         self.drive_of = _indices("drive_of", drive_of, np.arange(len(self.drives)), len(self.drives))
         self.n = len(self.drive_of)
         self.platform_of = _indices(
@@ -282,26 +282,6 @@ class Simulator:
     def swap(self) -> None:
         """The other copies of state and set-points hold now: a launch has written them."""
         self._now = 1 - self._now
-
-    def snapshot(self) -> Snapshot:
-        """Everything that changes, for :meth:`restore` of a simulator made alike."""
-        held = {"state": self.state_array, "delay": self.delay_array}
-        placed = {name: self._placing[name].array for name in ("machine_of", "drive_of")}
-        return {name: bytes_of(array) for name, array in (held | placed).items()}
-
-    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot.
-
-        Raises:
-            DataError: it is of another batch or version.
-        """
-        put_bytes(self.state_array, "state", snapshot)
-        put_bytes(self.delay_array, "delay", snapshot)
-        for name in ("machine_of", "drive_of"):
-            put_bytes(self._placing[name].array, name, snapshot)
-            self._placing[name].pull()
-        self.drive_of = self._placing["drive_of"].view
-        self.platform_of = self._placing["machine_of"].view
 
 
 def upload_drives(drives: Sequence[CueTrace], dt: float, device: Any) -> Any:

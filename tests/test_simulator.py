@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ActionError, ConfigurationError, DataError
@@ -228,3 +229,20 @@ def test_a_sample_outside_the_drive_is_refused(sample):
 def test_a_time_step_must_be_positive(dt):
     with pytest.raises(ConfigurationError, match="dt must be"):
         Simulator(PLATFORMS[0], DRIVES[0], dt=dt)
+
+
+@pytest.mark.parametrize("device", ["gpu", "cuda:99", "cpu:1"])
+def test_an_unknown_device_is_named_with_those_there_are(device):
+    with pytest.raises(ConfigurationError, match=rf"^device is '{device}'; use one of 'cpu'"):
+        Simulator(PLATFORMS[0], DRIVES[0], device=device)
+
+
+@pytest.mark.parametrize("device", ["cuda", "cuda:0"])
+def test_a_gpu_without_a_driver_is_refused_with_the_reason(device, monkeypatch):
+    def missing(name):
+        raise RuntimeError("not supported by the driver") if name == "cuda" else ValueError("invalid")
+
+    monkeypatch.setattr(wp, "get_device", missing)
+    monkeypatch.setattr(wp, "is_cuda_available", lambda: False)
+    with pytest.raises(ConfigurationError, match=rf"'{device}'.*Warp finds no CUDA driver"):
+        Simulator(PLATFORMS[0], DRIVES[0], device=device)

@@ -104,7 +104,12 @@ class WashoutBatch:
 
         Returns:
             (sets,) costs and (sets,) structured gradients with the fields of the kernel's ``Parameters``.
+
+        Raises:
+            ConfigurationError: there is not one step.
         """
+        if steps < 1:
+            raise ConfigurationError(f"steps must be at least 1, found {steps}")
         n, keep = self.simulator.n, {"requires_grad": True}
         states = [wp.zeros(n, dtype=State, **keep) for _ in range(steps + 1)]
         memories = [wp.zeros(n, dtype=Memory, **keep) for _ in range(steps + 1)]

@@ -83,6 +83,50 @@ class _Buffers:
         self.results = self.after.numpy(), self.action.numpy()
 
 
+def checked_observation(observation: Any) -> Array:
+    """Observations as the kernels' numbers.
+
+    Raises:
+        DataError: they are not (n, OBSERVATION_SIZE) or (OBSERVATION_SIZE,) finite numbers.
+    """
+    try:
+        values = np.asarray(observation, dtype=FLOAT)
+    except (TypeError, ValueError):
+        raise DataError(
+            f"observation is not numeric; give an array of (n, {OBSERVATION_SIZE}) numbers"
+        ) from None
+    if values.ndim not in (1, 2) or values.shape[-1] != OBSERVATION_SIZE or not len(values):
+        raise DataError(f"observation has shape {values.shape}, expected (n, {OBSERVATION_SIZE})")
+    if not np.isfinite(values).all():
+        raise DataError("observation is not finite")
+    return values
+
+
+def _checked_start(episode_start: Any, n: int) -> Array:
+    flags = np.asarray(episode_start)
+    if flags.dtype != np.bool_ or flags.shape != (n,):
+        raise DataError(
+            f"episode_start is {_kind(flags)}; give {n} booleans, one an observation, or None in mid-episode"
+        )
+    return flags
+
+
+def _checked_state(state: Any, dtype: np.dtype[Any], n: int) -> Array:
+    if not isinstance(state, np.ndarray) or state.dtype != dtype or state.shape != (n,):
+        raise DataError(
+            f"state is {_kind(state)}; give what the last call for these {n} observations returned, "
+            "or None to begin"
+        )
+    return state
+
+
+def _kind(values: Any) -> str:
+    if not isinstance(values, np.ndarray):
+        return f"of type {type(values).__name__}"
+    held = "washout memory" if values.dtype.names else str(values.dtype)
+    return f"an array of {held} of shape {values.shape}"
+
+
 class ClassicalWashout:
     """The paper's algorithm as a policy; its memory is the policy's state.
 
@@ -130,23 +174,21 @@ class ClassicalWashout:
         """Accelerations for observations; see :class:`~motion_cueing.baselines.policy.Policy`.
 
         Raises:
-            DataError: the observation has the wrong shape, or is not finite.
+            DataError: an argument has the wrong type or shape, or the observation is not finite.
         """
-        observation = np.asarray(observation, dtype=FLOAT)
-        if observation.ndim not in (1, 2) or observation.shape[-1] != OBSERVATION_SIZE:
-            raise DataError(f"observation has shape {observation.shape}, expected (n, {OBSERVATION_SIZE})")
-        if not np.isfinite(observation).all():
-            raise DataError("observation is not finite")
+        observation = checked_observation(observation)
         n = 1 if observation.ndim == 1 else len(observation)
         buffers = self._buffers.get(n) or self._make_buffers(n)
+        memory, action = buffers.results
+        if episode_start is not None:
+            episode_start = _checked_start(episode_start, n)
+        if state is not None:
+            buffers.views["memory"][...] = _checked_state(state, memory.dtype, n)
         buffers.views["observation"][...] = observation
         buffers.views["begins"][...] = (
             True if state is None else episode_start if episode_start is not None else False
         )
-        if state is not None:
-            buffers.views["memory"][...] = state
         buffers.launch.launch()
-        memory, action = buffers.results
         return action.reshape(*observation.shape[:-1], N_AXES).copy(), memory.copy()
 
     def _make_buffers(self, n: int) -> _Buffers:

@@ -9,12 +9,13 @@ from typing import Any, Final
 import numpy as np
 import warp as wp
 
-from ...envs.errors import ActionError, ConfigurationError
+from ...envs.errors import ActionError, ConfigurationError, DataError
+from ...envs.observation import OBSERVATION_SIZE
 from ...envs.platform.machines import Cab
 from ...envs.simulator import TIME_STEP
 from ..policy import Array
 from .parameters import WashoutParameters
-from .policy import ClassicalWashout, kernel_parameters
+from .policy import ClassicalWashout, checked_observation, kernel_parameters
 from .step import Parameters
 
 KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -70,17 +71,22 @@ class ScheduledWashout(ClassicalWashout):
         """Accelerations (n, 9) for observations (n, OBSERVATION_SIZE) with gains (n, k) in [-1, 1].
 
         Raises:
-            ActionError: the gains have the wrong shape, or are not finite.
+            ActionError: the gains are not numbers, have the wrong shape, or are not finite.
+            DataError: another argument has the wrong type or shape, or the observation is not finite.
         """
-        n, gains = len(observation), np.asarray(gains, dtype=np.float64)
-        if gains.shape != (n, len(KNOBS)) or not np.isfinite(gains).all():
-            raise ActionError(f"gains must be finite and of shape ({n}, {len(KNOBS)}), found {gains.shape}")
+        observation = checked_observation(observation)
+        if observation.ndim != 2:
+            raise DataError(f"observation has shape {observation.shape}, expected (n, {OBSERVATION_SIZE})")
+        n = len(observation)
+        gains = _checked_gains(gains, n)
         if n not in self._buffers:
             self._make_buffers(n)
         self._turn(self._tables[n], self.span**gains)
-        action, after = self.predict(observation, state, episode_start)
-        self._turn(self._tables[n], np.ones_like(gains))
-        return action, after
+        try:
+            return self.predict(observation, state, episode_start)
+        finally:
+            # A refused argument must not leave the gains behind for the next plain predict.
+            self._turn(self._tables[n], np.ones_like(gains))
 
     def _turn(self, table: Array, factors: Array) -> None:
         """Write the parameters of every environment, ``factors`` (n, k) times the neutral ones."""
@@ -98,3 +104,14 @@ class ScheduledWashout(ClassicalWashout):
         parameters = wp.array(values, dtype=Parameters, device="cpu")
         self._tables[n] = parameters.numpy()
         return self._buffers_with(n, parameters, wp.array(np.arange(n), dtype=int, device="cpu"))
+
+
+def _checked_gains(gains: Array, n: int) -> Array:
+    shape = (n, len(KNOBS))
+    try:
+        values = np.asarray(gains, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ActionError(f"gains are not numeric; give an array of {shape} numbers in [-1, 1]") from None
+    if values.shape != shape or not np.isfinite(values).all():
+        raise ActionError(f"gains must be finite and of shape {shape}, found {values.shape}")
+    return values

@@ -11,7 +11,7 @@ import pytest
 from motion_cueing.baselines.washout import ClassicalWashout, load_washout
 from motion_cueing.baselines.washout.parameters import LowPass
 from motion_cueing.baselines.washout.scheduled import KNOBS, ScheduledWashout
-from motion_cueing.envs.errors import ActionError, ConfigurationError
+from motion_cueing.envs.errors import ActionError, ConfigurationError, DataError
 from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator
 
@@ -97,3 +97,23 @@ def test_pickled_policy_is_the_same_and_wrong_arguments_are_named():
         ScheduledWashout(span=1.0)
     with pytest.raises(ActionError, match=r"gains must be finite and of shape \(1, 6\)"):
         policy.schedule(observations(1)[0][:1], np.zeros((1, 5)))
+    with pytest.raises(ActionError, match=r"gains are not numeric"):
+        policy.schedule(observations(1)[0][:1], [["high"] * len(KNOBS)])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"observation": np.zeros(7)}, "observation has shape"),
+        ({"observation": observations(1)[0][0]}, "observation has shape"),
+        ({"state": np.zeros(N)}, "state is an array of float64"),
+        ({"episode_start": np.zeros(N)}, "episode_start is an array of float64"),
+    ],
+)
+def test_refused_arguments_leave_no_gains_behind(arguments, told):
+    policy, seen = ScheduledWashout("brk"), observations(1)[0]
+    expected, memory = policy.predict(seen)
+    good = {"observation": seen, "state": memory, "episode_start": np.zeros(N, dtype=bool)}
+    with pytest.raises(DataError, match=told):
+        policy.schedule(gains=np.ones((N, len(KNOBS))), **(good | arguments))
+    assert np.array_equal(policy.predict(seen)[0], expected)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,13 @@ from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy, make_pol
 from motion_cueing.baselines.washout import (
     HighPass,
     LowPass,
+    ScheduledWashout,
     TiltCoordination,
     WashoutParameters,
     load_washout,
     washout_presets,
 )
+from motion_cueing.baselines.washout.step import Memory
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.platform import get_platform
@@ -271,3 +274,52 @@ def test_unknown_names_and_broken_observations():
         washout.predict(np.zeros(7))
     with pytest.raises(DataError, match="not finite"):
         washout.predict(np.full(OBSERVATION_SIZE, np.nan))
+
+
+ROWS = np.zeros((3, OBSERVATION_SIZE))
+MEMORY = np.zeros(len(ROWS), dtype=Memory.numpy_dtype())
+
+
+@pytest.mark.parametrize("kind", [ClassicalWashout, ScheduledWashout])
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"observation": [["fast"] * OBSERVATION_SIZE]}, "observation is not numeric; give an array"),
+        ({"observation": {"force": 1.0}}, "observation is not numeric; give an array"),
+        ({"observation": [[1.0], [1.0, 2.0]]}, "observation is not numeric; give an array"),
+        ({"observation": ROWS[None]}, "observation has shape (1, 3, 52), expected (n, 52)"),
+        ({"observation": ROWS[:0]}, "observation has shape (0, 52), expected (n, 52)"),
+        ({"observation": 1.0}, "observation has shape (), expected (n, 52)"),
+        ({"state": "begin"}, "state is of type str; give what the last call"),
+        ({"state": (MEMORY,)}, "state is of type tuple; give what the last call"),
+        ({"state": np.zeros(3)}, "state is an array of float64 of shape (3,); give what the last call"),
+        ({"state": MEMORY[:2]}, "state is an array of washout memory of shape (2,); give what"),
+        ({"state": MEMORY[None]}, "state is an array of washout memory of shape (1, 3); give what"),
+        (
+            {"episode_start": np.zeros(3)},
+            "episode_start is an array of float64 of shape (3,); give 3 booleans",
+        ),
+        ({"episode_start": np.zeros(2, dtype=bool)}, "episode_start is an array of bool of shape (2,)"),
+        ({"episode_start": True}, "episode_start is an array of bool of shape (); give 3 booleans"),
+        ({"episode_start": "yes"}, "give 3 booleans, one an observation, or None"),
+    ],
+)
+def test_wrong_arguments_are_named_and_leave_the_policy_as_it_was(kind, arguments, told):
+    policy = kind("est1")
+    observation = np.random.default_rng(6).normal(size=ROWS.shape)
+    expected, _ = policy.predict(observation, MEMORY)
+    good = {"observation": observation, "state": MEMORY, "episode_start": np.zeros(3, dtype=bool)}
+    with pytest.raises(DataError) as error:
+        policy.predict(**(good | arguments))
+    assert told in str(error.value)
+    again, _ = policy.predict(**good)
+    assert np.array_equal(again, expected)
+
+
+def test_memory_that_was_stored_is_taken_back():
+    policy = ClassicalWashout("est1")
+    observation = np.random.default_rng(7).normal(size=ROWS.shape)
+    _, memory = policy.predict(observation)
+    expected, _ = policy.predict(observation, memory)
+    stored, _ = policy.predict(observation, pickle.loads(pickle.dumps(memory)), [False, False, False])
+    assert np.array_equal(stored, expected)

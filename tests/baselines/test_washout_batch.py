@@ -86,3 +86,10 @@ def test_a_lagging_machine_is_refused():
     )
     with pytest.raises(ConfigurationError, match="actuator dynamics"):
         WashoutBatch([load_washout("est1")], DRIVES, lagging)
+
+
+@pytest.mark.parametrize("steps", [0, -1])
+def test_a_gradient_over_no_step_is_refused(steps):
+    batch = WashoutBatch([load_washout("est1")], DRIVES, PAPER)
+    with pytest.raises(ConfigurationError, match=f"steps must be at least 1, found {steps}"):
+        batch.gradient(steps)

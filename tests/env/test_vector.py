@@ -90,6 +90,8 @@ def test_observations_are_copies_unless_told_otherwise():
 def test_wrong_arguments_are_named():
     with pytest.raises(ConfigurationError, match="at least one environment"):
         DrivingSimulatorVector(0, episode=SHORT)
+    with pytest.raises(ConfigurationError, match="device is 'gpu'; use one of 'cpu'"):
+        DrivingSimulatorVector(N, episode=SHORT, device="gpu")
     batch = DrivingSimulatorVector(N, episode=SHORT)
     batch.reset(seed=0)
     with pytest.raises(ActionError, match=r"shape \(2, 9\), expected \(3, 9\)"):
