@@ -68,8 +68,8 @@ def _driven(plans: list[Plan]) -> list[CueTrace]:
             car = plan.car
             raise ConfigurationError(
                 f"{car.name} with tire friction {car.tires.friction:.2f} came {offset:.1f} m off the path of "
-                f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomisation.friction, or leave the drive "
-                "or the car out of episode"
+                f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomisation.friction, or leave the "
+                "drive or the car out of episode"
             )
     return traces
 
