@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +20,7 @@ from .platform.machines import Platform
 from .platform.parameters import dead_steps, machine_parameters
 from .platform.state import ACTUATORS, Machine, SetPoint
 from .precision import FLOAT, real, vec3, vec9
+from .snapshot import Snapshot, bytes_of, put_bytes
 from .state import Drives, State
 from .step import reset_forward, step_forward
 
@@ -282,6 +283,26 @@ class Simulator:
     def swap(self) -> None:
         """The other copies of state and set-points hold now: a launch has written them."""
         self._now = 1 - self._now
+
+    def snapshot(self) -> Snapshot:
+        """Everything that changes, for :meth:`restore` of a simulator made alike."""
+        held = {"state": self.state_array, "delay": self.delay_array}
+        placed = {name: self._placing[name].array for name in ("machine_of", "drive_of")}
+        return {name: bytes_of(array) for name, array in (held | placed).items()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot.
+
+        Raises:
+            DataError: it is of another batch or version.
+        """
+        put_bytes(self.state_array, "state", snapshot)
+        put_bytes(self.delay_array, "delay", snapshot)
+        for name in ("machine_of", "drive_of"):
+            put_bytes(self._placing[name].array, name, snapshot)
+            self._placing[name].pull()
+        self.drive_of = self._placing["drive_of"].view
+        self.platform_of = self._placing["machine_of"].view
 
 
 def upload_drives(drives: Sequence[CueTrace], dt: float, device: Any) -> Any:
