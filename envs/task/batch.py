@@ -71,8 +71,8 @@ class Batch:
         self.time_step = TIME_STEP * options.action.repeat
         self._lengths = np.array([len(drive) for drive in self.drives])
         self._keys, self._episodes = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.int64)
-        rules = rules_of(options, self.layout, self.platform, TIME_STEP)
-        self._launches = Launches(self.simulator, self.arrays, rules)
+        self.rules = rules_of(options, self.layout, self.platform, TIME_STEP)
+        self._launches = Launches(self.simulator, self.arrays, self.rules)
 
     def _library(self, drives: Sequence[CueTrace] | None) -> list[CueTrace]:
         if drives is None:

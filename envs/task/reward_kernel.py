@@ -144,11 +144,15 @@ def action_change(now: wp.array2d(dtype=wp.float32), before: wp.array2d(dtype=wp
 @wp.func
 def terms_now(r: RewardScale, m: Machine, s: State, share: real) -> vec_terms:
     """The terms of a time step that belong to the state, times ``share``."""
-    t = vec_terms()
-    t[0] = cue_error(r.zone, s)
-    t[1] = perceived_error(r.zone, s)
-    t[2] = false_cues(r, s)
-    t[3] = tilt_excess(r, s)
-    t[4] = stroke_excess(r, m, s)
-    t[5] = limited_share(s.limits)
+    zero = real(0.0)
+    t = vec_terms(
+        cue_error(r.zone, s),
+        perceived_error(r.zone, s),
+        false_cues(r, s),
+        tilt_excess(r, s),
+        stroke_excess(r, m, s),
+        limited_share(s.limits),
+        zero,
+        zero,
+    )
     return t * share
