@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class MotionCueingError(Exception):
@@ -36,6 +39,17 @@ class UnknownNameError(MotionCueingError, KeyError):
     def __str__(self) -> str:
         # KeyError would show the repr of the message.
         return str(self.args[0])
+
+
+def look_up(kind: str, name: str, known: Mapping[str, T]) -> T:
+    """What is registered under a name.
+
+    Raises:
+        UnknownNameError: nothing is; the message lists the nearest known names.
+    """
+    if name not in known:
+        raise UnknownNameError(kind, name, known)
+    return known[name]
 
 
 def suggest(name: str, known: Iterable[str]) -> str:

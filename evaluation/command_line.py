@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final
 
-from ..envs.errors import ConfigurationError, MotionCueingError, UnknownNameError
+from ..envs.errors import ConfigurationError, MotionCueingError, look_up
 from .complaint import plain_complaint
 
 PROGRAM: Final = "motion-cueing"
@@ -96,9 +96,7 @@ def _dispatch(arguments: list[str]) -> int:
         print(f"{PROGRAM} {package_version()}")
         return SUCCESS
     name, rest = arguments[0], arguments[1:]
-    if name not in COMMANDS:
-        raise UnknownNameError("command", name, COMMANDS)
-    command = COMMANDS[name]
+    command = look_up("command", name, COMMANDS)
     module = import_module(command.module, __package__)
     parsed = _parse(name, getattr(module, command.arguments), rest)
     return parsed if isinstance(parsed, int) else int(module.run(parsed))

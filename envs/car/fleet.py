@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..errors import UnknownNameError
+from ..errors import look_up
 from .vehicles import Car, Drivetrain, Steering, Suspension, Tires
 
 SEDAN: Final = Car(
@@ -140,6 +140,4 @@ def get_car(name: str) -> Car:
     Raises:
         UnknownNameError: no such car; the message lists the nearest names.
     """
-    if name not in _FLEET:
-        raise UnknownNameError("car", name, _FLEET)
-    return _FLEET[name]
+    return look_up("car", name, _FLEET)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..errors import UnknownNameError
+from ..errors import look_up
 from .cone_maneuvers import DoubleLaneChange, ObstacleAvoidance, Slalom
 from .maneuver import Maneuver
 from .paper_maneuvers import Braking, LaneChange, SteadyTurn
@@ -39,6 +39,4 @@ def get_maneuver(name: str) -> Maneuver:
     Raises:
         UnknownNameError: no such maneuver; the message lists the nearest names.
     """
-    if name not in _BY_NAME:
-        raise UnknownNameError("maneuver", name, _BY_NAME)
-    return _BY_NAME[name]()
+    return look_up("maneuver", name, _BY_NAME)()

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from ..cues import CueTrace
-from ..errors import UnknownNameError
+from ..errors import look_up
 
 _FOLDER: Final = Path(__file__).parent / "recorded"
 _FILE: Final = "cues.csv.gz"
@@ -34,6 +34,5 @@ def get_recording(name: str) -> CueTrace:
     Raises:
         UnknownNameError: no recording has this name.
     """
-    if name not in _SOURCES:
-        raise UnknownNameError("recording", name, _SOURCES)
-    return replace(CueTrace.from_csv(_FOLDER / name / _FILE, name=name), source=_SOURCES[name])
+    source = look_up("recording", name, _SOURCES)
+    return replace(CueTrace.from_csv(_FOLDER / name / _FILE, name=name), source=source)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from ..errors import UnknownNameError
+from ..errors import look_up
 from ..settings import NonNegative, Positive, Vector3, configuration
 
 
@@ -112,9 +112,7 @@ def get_vestibular_model(name: str) -> VestibularModel:
     Raises:
         UnknownNameError: no set has this name.
     """
-    if name not in _MODELS:
-        raise UnknownNameError("vestibular model", name, _MODELS)
-    return _MODELS[name]
+    return look_up("vestibular model", name, _MODELS)
 
 
 @dataclass(frozen=True)

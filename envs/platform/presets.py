@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import GeometryError, UnknownNameError
+from ..errors import GeometryError, look_up
 from ..settings import Vector3, load
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
 from .parameters import check_geometry
@@ -179,9 +179,7 @@ def get_platform(name: str) -> Platform:
     Raises:
         UnknownNameError: no preset has this name.
     """
-    if name not in _PRESETS:
-        raise UnknownNameError("platform", name, _PRESETS)
-    return _PRESETS[name]()
+    return look_up("platform", name, _PRESETS)()
 
 
 def load_platform(path: str | Path) -> Platform:
