@@ -169,7 +169,7 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
 
     Args:
         algo: The algorithm; None for the one that the file names.
-        path: YAML file with any of the fields; mappings are merged, all else replaces.
+        path: YAML file with any of the fields; mappings are merged (but for ``search``), all else replaces.
         **fields: Fields of :class:`TrainingConfig` that go before the file; None leaves one as it is.
 
     Raises:
@@ -187,6 +187,9 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
     preset = _fields(preset_file(get_algorithm(str(name))))
     chosen = {key: value for key, value in fields.items() if value is not None}
     merged = merge(merge(preset, given), {"algo": name, **chosen})
+    if "search" in given:
+        # What is varied is meant as a whole.
+        merged["search"] = given["search"]
     config = from_dict(TrainingConfig, merged, str(path) if path is not None else f"--algo {name}")
     if isinstance(config.base, str) and Path(config.base).suffix in (".yaml", ".yml"):
         # The file may not be there any more when the training is resumed.

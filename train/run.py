@@ -60,11 +60,7 @@ class RunFolder:
         Raises:
             ConfigurationError: the folder is not empty.
         """
-        path = path or _next_free(config.algo)
-        if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            hint = f"use --resume {path} to go on with it" if (path / _CONFIG).exists() else "name a new one"
-            raise ConfigurationError(f"--out {path}: there is something already; {hint}")
-        return cls(path, config)
+        return cls(free_folder(path, config.algo), config)
 
     @classmethod
     def open(cls, path: Path) -> RunFolder:
@@ -107,6 +103,14 @@ class RunFolder:
         record = {"algo": self.config.algo, "seed": self.config.seed, "sessions": self.sessions}
         write_text(self.path / _RECORD, json.dumps(record, indent=2) + "\n")
 
+    def changed_versions(self) -> list[str]:
+        """What is installed in another version than in the first session."""
+        first = self.sessions[0]["versions"] if self.sessions else {}
+        now = provenance.versions()
+        return [
+            f"{name} was {was}, is {now.get(name)}" for name, was in first.items() if now.get(name) != was
+        ]
+
     def extend(self, steps: int) -> None:
         """Train to another number of steps than was chosen at first."""
         self.config = replace(self.config, steps=steps)
@@ -129,8 +133,18 @@ class RunFolder:
         return read_checkpoint(found[-1]) if found else None
 
 
-def _next_free(name: str) -> Path:
-    number = 1
-    while (_DEFAULT_PARENT / f"{name}-{number}").exists():
-        number += 1
-    return _DEFAULT_PARENT / f"{name}-{number}"
+def free_folder(path: Path | None, name: str) -> Path:
+    """A folder without anything in it: the one given, or the next of ``runs/NAME-1``, -2...
+
+    Raises:
+        ConfigurationError: there is something in the one given.
+    """
+    if path is None:
+        number = 1
+        while (_DEFAULT_PARENT / f"{name}-{number}").exists():
+            number += 1
+        return _DEFAULT_PARENT / f"{name}-{number}"
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        hint = f"use --resume {path} to go on with it" if (path / _CONFIG).exists() else "name a new one"
+        raise ConfigurationError(f"--out {path}: there is something already; {hint}")
+    return path

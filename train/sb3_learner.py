@@ -13,6 +13,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
+from ..envs.errors import ConfigurationError
 from .agent import Network
 from .base_policy import base_policy
 from .config import TrainingConfig
@@ -53,9 +54,7 @@ class SB3Learner:
         env: VecEnv = self.normalize or self.simulators
         (size,) = self.simulators.action_space.shape or (0,)
         hyperparameters = arguments(algorithm, config.hyperparameters, size)
-        self.model: BaseAlgorithm = algorithm(
-            "MlpPolicy", env, seed=config.seed, device=config.device, **hyperparameters
-        )
+        self.model = _model(algorithm, env, config, hyperparameters)
         self.model.set_logger(Logger(None, output_formats=[]))
         self.monitor = Monitor()
 
@@ -99,6 +98,16 @@ class SB3Learner:
         restore(state, self.model, self.simulators, self.normalize)
         self.monitor.restore(state["monitor"])
         self.model.logger.name_to_value.update(state["told"])
+
+
+def _model(
+    algorithm: type[BaseAlgorithm], env: VecEnv, config: TrainingConfig, hyperparameters: dict[str, Any]
+) -> BaseAlgorithm:
+    try:
+        return algorithm("MlpPolicy", env, seed=config.seed, device=config.device, **hyperparameters)
+    except (AssertionError, TypeError, ValueError) as error:
+        # Values that are right by themselves, but do not go together.
+        raise ConfigurationError(f"hyperparameters: {' '.join(str(error).split())}") from None
 
 
 def _normalized(env: DrivingSimulatorVecEnv, config: TrainingConfig) -> VecNormalize | None:

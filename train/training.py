@@ -12,6 +12,7 @@ from ..baselines import make_policy
 from ..envs.task.library import platform_of
 from .agent import Agent, Record
 from .base_policy import DEFAULT, base_parameters
+from .config import Measure
 from .interrupt import Interrupt
 from .learner import Learner, StopTraining
 from .logs import TrainingLog
@@ -99,7 +100,9 @@ class Training:
         self.status.best, self.status.reference = state["best"], state["reference"]
 
     def train(self) -> Outcome:
-        """Train to the configuration's steps, or until Ctrl-C."""
+        """Train to the configuration's steps, or until Ctrl-C; nothing where that is done already."""
+        if self.status.steps >= self.config.steps and self.run.final_agent.exists():
+            return Outcome(self.status, interrupted=False)
         self.run.begin(self.status.steps)
         self.log = TrainingLog(self.run.path, self.status.steps)
         try:
@@ -149,8 +152,7 @@ class Training:
         score = self.validation.score(network)
         status.score, status.news = score, True
         self.log.write(status.steps, score.scalars())
-        name = self.config.validation.best
-        value = -score.reward if name == "reward" else float(getattr(score, name))
+        value = rating(score, self.config.validation.best)
         if status.best is None or value < status.best:
             status.best = value
             self.agent("best").save(self.run.best_agent)
@@ -185,3 +187,8 @@ class Training:
 
     def _finish(self) -> None:
         self.agent("final").save(self.run.final_agent)
+
+
+def rating(score: Score, measure: Measure) -> float:
+    """What a configuration calls best, lower is better."""
+    return -score.reward if measure == "reward" else float(getattr(score, measure))
