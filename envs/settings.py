@@ -20,7 +20,7 @@ from typing_extensions import dataclass_transform
 from .errors import ConfigurationError, DataError, suggest
 from .storage import write_text
 
-STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
+_STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -38,7 +38,7 @@ def configuration(cls: type[T]) -> type[T]:
         ConfigurationError: when an object of it is made, or replaced, with a field that is unknown,
             missing, of the wrong type or out of range.
     """
-    made: Any = dataclass(frozen=True, config=STRICT)(cls)
+    made: Any = dataclass(frozen=True, config=_STRICT)(cls)
     check = made.__init__
 
     @functools.wraps(check)
