@@ -47,6 +47,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     ),
     "import": Command(".import_command", "ImportCommand", "turn a log of a drive into cues"),
     "render": Command(".render_command", "RenderCommand", "draw a drive as a film or a picture"),
+    "export": Command(".export_command", "ExportCommand", "write an agent as an ONNX file"),
     "train": Command("..train.train_command", "TrainCommand", "train an agent on random drives"),
 }
 

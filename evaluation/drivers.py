@@ -203,8 +203,7 @@ class TaskDriver:
             action, seconds = self._ask(batch.arrays.observation.pull().copy())
             batch.write(action[None])
             for k in batch.play():
-                asked = np.array(batch.arrays.command.pull()["acceleration"][0], dtype=np.float64)
-                yield Sample(asked, self.simulator.state[0], seconds if k == 0 else np.nan)
+                yield Sample(batch.asked[0], self.simulator.state[0], seconds if k == 0 else np.nan)
 
 
 def check_machine(policy: TaskPolicy, platform: Platform) -> None:

@@ -1,0 +1,39 @@
+"""Agents with random weights, for tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from motion_cueing.baselines.washout.scheduled import KNOBS
+from motion_cueing.envs.task import TaskOptions
+from motion_cueing.envs.task.layout import layout_of
+from motion_cueing.train.agent import Agent, Network, Record
+
+RECORD = Record(
+    algo="ppo", seed=3, command="motion-cueing train --algo ppo", steps=1000, versions={"numpy": "2.0"}
+)
+
+
+def network(sizes, seed: int = 0, normalised: bool = True, **choices: Any) -> Network:
+    """A network with the sizes of its layers, input first."""
+    rng = np.random.default_rng(seed)
+    extra = [0] * (len(sizes) - 2) + [sizes[0] if choices.get("skip") else 0]
+    shapes = [(b, a + e) for a, b, e in zip(sizes, sizes[1:], extra, strict=False)]
+    statistics = {}
+    if normalised:
+        statistics = {"mean": rng.normal(size=sizes[0]), "variance": rng.uniform(0.01, 4.0, sizes[0])}
+    return Network(
+        weights=tuple(rng.normal(size=shape) / np.sqrt(shape[1]) for shape in shapes),
+        biases=tuple(0.1 * rng.normal(size=shape[0]) for shape in shapes),
+        **{**statistics, **choices},
+    )
+
+
+def agent(task: TaskOptions | None = None, base: Any = None, name: str = "random", **choices: Any) -> Agent:
+    """An agent with a small network that fits a task."""
+    task = task or TaskOptions()
+    outputs = len(KNOBS) if task.action.mode == "gains" else 9
+    size = layout_of(task.observation, task.action.mode, outputs).size
+    return Agent(name, task, network((size, 16, 16, outputs), **choices), RECORD, base)
