@@ -14,7 +14,6 @@ from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
-from pydantic_core import ArgsKwargs
 from typing_extensions import dataclass_transform
 
 from .errors import ConfigurationError, DataError, suggest
@@ -108,7 +107,7 @@ def _describe_one(item: dict[str, Any], cls: type[Any]) -> str:
     message = str(item["msg"]).removeprefix("Value error, ")
     told = f"field {path!r}: {message}" if path else message
     # The check of a whole configuration says itself what it found.
-    whole = item["type"] == "value_error" and isinstance(item["input"], dict | ArgsKwargs)
+    whole = item["type"] == "value_error" and (not path or isinstance(item["input"], dict))
     return told if whole else f"{told} (found {item['input']!r})"
 
 

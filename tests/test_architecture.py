@@ -73,8 +73,8 @@ def room(module: str) -> str | None:
 def test_the_imports_of_known_modules_are_found():
     assert "envs.platform.frames" in imports("baselines.washout.step")
     assert {"envs.cues", "evaluation.trajectory", "baselines.policy"} <= imports("evaluation.rollout")
-    assert "baselines" not in imports("evaluation.evaluate_command", everywhere=False)
-    assert "baselines" in imports("evaluation.evaluate_command")
+    assert "evaluation.policies" not in imports("evaluation.evaluate_command", everywhere=False)
+    assert "evaluation.policies" in imports("evaluation.evaluate_command")
     assert set(ALLOWED) == set(PACKAGES)
 
 
