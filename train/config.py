@@ -110,6 +110,7 @@ class TrainingConfig:
         task: The environment. ``task.episode.drives`` stays empty: only random drives are trained on.
         base: Washout under the agent, where ``task.action.mode`` needs one: its parameters, a preset or a
             YAML file; "classical" if none is named.
+        initial: Agent file whose network the training begins with; it sees and does the same.
         hyperparameters: Arguments of the algorithm.
         normalize: Running normalisation.
         n_envs: Environments stepped together.
@@ -126,6 +127,7 @@ class TrainingConfig:
     algo: str
     task: TaskOptions = TaskOptions()
     base: WashoutParameters | str | None = None
+    initial: str | None = None
     hyperparameters: dict[str, JsonValue] = field(default_factory=dict)
     normalize: NormalizeOptions = NormalizeOptions()
     n_envs: PositiveCount = 64

@@ -15,8 +15,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import nn
 
 from ..envs.errors import DataError
+from .actor import ACTIVATIONS
 from .agent import Network
-from .hyperparameters import ACTIVATIONS
 
 _NAMES = {module: name for name, module in ACTIVATIONS.items()}
 
@@ -71,7 +71,8 @@ def _activation(layers: Iterable[nn.Module]) -> str:
         return "tanh"
     if len(kinds) > 1 or not kinds <= _NAMES.keys():
         found = ", ".join(sorted(kind.__name__ for kind in kinds))
-        raise DataError(f"the policy has layers {found}; a network has one of {', '.join(ACTIVATIONS)}")
+        hint = "; with use_sde set policy_kwargs.clip_mean to 0" if nn.Hardtanh in kinds else ""
+        raise DataError(f"the policy has layers {found}; a network has one of {', '.join(ACTIVATIONS)}{hint}")
     return _NAMES[kinds.pop()]
 
 

@@ -11,17 +11,9 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
-from torch import nn
 
 from ..envs.errors import ConfigurationError, suggest
-
-ACTIVATIONS: Final[Mapping[str, type[nn.Module]]] = {
-    "tanh": nn.Tanh,
-    "relu": nn.ReLU,
-    "elu": nn.ELU,
-    "silu": nn.SiLU,
-}
-"""Names that ``policy_kwargs.activation_fn`` takes."""
+from .actor import ACTIVATIONS
 
 SCHEDULED: Final = "lin_"
 """Before a number: it falls linearly to zero at the end of the training."""

@@ -52,6 +52,12 @@ for _algorithm in (
     Algorithm("sac", _SB3, "soft actor-critic"),
     Algorithm("td3", _SB3, "twin delayed deep deterministic policy gradient"),
     Algorithm("tqc", _SB3, "truncated quantile critics", _CONTRIB),
+    Algorithm(
+        "apg",
+        "motion_cueing.train.gradient_learner",
+        "analytic policy gradient, through the machine",
+        ("torch",),
+    ),
 ):
     register(_algorithm)
 

@@ -96,7 +96,11 @@ def tilt_excess(r: RewardScale, s: State) -> real:
     """Square of the tilt rate above its threshold, in thresholds."""
     roll = beyond(s.wanted.rate[0], s.felt.rate[0])
     pitch = beyond(s.wanted.rate[1], s.felt.rate[1])
-    excess = wp.max(wp.sqrt(roll * roll + pitch * pitch) / r.tilt_rate - real(1.0), real(0.0))
+    squared = (roll * roll + pitch * pitch) / (r.tilt_rate * r.tilt_rate)
+    # Before the root, whose derivative at zero is infinite.
+    if squared <= real(1.0):
+        return real(0.0)
+    excess = wp.sqrt(squared) - real(1.0)
     return excess * excess
 
 

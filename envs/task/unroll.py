@@ -14,6 +14,7 @@ from ..platform.state import SetPoint
 from ..precision import real, vec9
 from ..state import State
 from .batch import Batch
+from .reward_kernel import vec_terms
 from .unroll_kernels import look_with_adjoint, play_with_adjoint
 
 _MODES: Final = ("acceleration", "jerk", "velocity")
@@ -23,8 +24,8 @@ class TaskUnroll:
     """What a batch would do over a number of actions, kept so that gradients can be led back through it.
 
     Forward: :meth:`begin`, then for each action k = 0, 1, ...: :meth:`observe`, :meth:`act`. Backward, after
-    :meth:`weigh` first: for k from the last to the first: :meth:`back_through_act`, which tells the gradient
-    with respect to action k; then :meth:`back_through_observe` with the gradient with respect to what was seen.
+    :meth:`weigh`, for k from the last to the first: :meth:`back_through_act`, which tells the gradient with
+    respect to action k, and :meth:`back_through_observe` with that of what was seen.
 
     Args:
         batch: Where episodes are drawn; its own state stays where it is.
@@ -67,6 +68,7 @@ class TaskUnroll:
         self._fixed = [wp.zeros((n, OBSERVATION_SIZE), dtype=real, **keep) for _ in range(self.actions)]
         self._seen = [wp.zeros((n, batch.layout.size), dtype=wp.float32, **keep) for _ in range(self.actions)]
         self._costs = wp.zeros(n, dtype=real, **keep)
+        self._terms = wp.zeros(n, dtype=vec_terms, device=device)
         self._all = [*self._states, *self._delays, *self._own, *self._taken, *self._fixed, *self._seen]
 
     def _record(self, k: int, adjoint: bool) -> tuple[Any, list[Any]]:
@@ -107,7 +109,8 @@ class TaskUnroll:
         return [
             batch.rules, batch.arrays.episode.array, *constants, int(step == 0),
             self._taken[k + 1], self._taken[k], self._own[i], self._states[i], self._delays[i],
-            self._own[i + 1], self._states[i + 1], self._delays[i + 1], self._costs,
+            self._own[i + 1], self._states[i + 1], self._delays[i + 1],
+            self._terms, self._costs,
         ]  # fmt: skip
 
     def begin(self) -> None:
@@ -116,6 +119,7 @@ class TaskUnroll:
         wp.copy(self._states[0], simulator.state_array)
         wp.copy(self._delays[0], simulator.delay_array)
         self._costs.zero_()
+        self._terms.zero_()
 
     def observe(self, k: int) -> NDArray[np.float32]:
         """(n, size) what is seen before action k; the array is the unroll's own."""
@@ -132,6 +136,12 @@ class TaskUnroll:
     def costs(self) -> NDArray[np.float64]:
         """(n,) minus the mean reward an action."""
         return np.asarray(self._costs.numpy()) / self.actions
+
+    @property
+    def terms(self) -> NDArray[np.float64]:
+        """(N_TERMS,) mean of every term of the reward that belongs to the state, unweighted."""
+        means: NDArray[np.float64] = self._terms.numpy().mean(axis=0) / self.actions
+        return means
 
     def weigh(self, weights: NDArray[np.float64]) -> None:
         """Begin the way back: the gradients will be those of the sum of ``weights`` (n,) times the costs."""

@@ -17,7 +17,7 @@ from .act_kernel import applied_accelerations, own_accelerations
 from .episode import Episode
 from .kernels import Rules
 from .observe_kernel import write_frame
-from .reward_kernel import action_change, terms_now
+from .reward_kernel import action_change, terms_now, vec_terms
 
 ACTION_RATE = wp.constant(6)
 """Place of the change of the action among the reward's terms."""
@@ -41,9 +41,10 @@ def play_with_adjoint(
     own_out: wp.array(dtype=vec9),
     state_out: wp.array(dtype=State),
     delay_out: wp.array2d(dtype=SetPoint),
+    terms: wp.array(dtype=vec_terms),
     cost: wp.array(dtype=real),
 ) -> None:
-    """One time step; adds minus its reward to the cost. ``now`` lies within [-1, 1]."""
+    """One time step; adds its terms, and minus its reward to the cost. ``now`` lies within [-1, 1]."""
     i = wp.tid()
     m = machines[machine_of[i]]
     s = state[i]
@@ -56,7 +57,9 @@ def play_with_adjoint(
     if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
-    spent = wp.dot(rules.reward.weights, terms_now(rules.reward, m, after, rules.share))
+    found = terms_now(rules.reward, m, after, rules.share)
+    wp.atomic_add(terms, i, found)
+    spent = wp.dot(rules.reward.weights, found)
     if first != 0:
         spent = spent + rules.reward.weights[ACTION_RATE] * action_change(now, before, i)
     wp.atomic_add(cost, i, spent)

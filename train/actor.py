@@ -1,0 +1,155 @@
+"""The network that training moves: its last layer sees the hidden ones and the observation itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from ..envs.errors import DataError
+from ..envs.platform.state import AXES
+from ..envs.task.batch import Batch
+from ..envs.task.layout import Layout
+from .agent import Network
+
+ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {
+    "tanh": nn.Tanh,
+    "relu": nn.ReLU,
+    "elu": nn.ELU,
+    "silu": nn.SiLU,
+}
+"""Names of activations."""
+
+_QUIET: Final = 0.002
+"""Standard deviation of the last layer's weights on the hidden layer at the beginning."""
+
+_SPRINGS: Final = {"carriage": 0.3, "hexapod": 1.0}
+"""Natural frequency of the spring and damper a training begins with, rad/s."""
+
+_TURNTABLE_DAMPING: Final = 0.5
+"""Of the turntable at the beginning, 1/s."""
+
+
+class Latent(nn.Module):
+    """[last hidden layer, observation]: what the last layer sees.
+
+    Args:
+        size: Entries of an observation.
+        hidden: Entries of each hidden layer.
+        activation: One of :data:`ACTIVATIONS`.
+    """
+
+    def __init__(self, size: int, hidden: Sequence[int], activation: str) -> None:
+        super().__init__()
+        layers: list[nn.Module] = []
+        inputs = size
+        for outputs in hidden:
+            layers += [nn.Linear(inputs, outputs), ACTIVATIONS[activation]()]
+            inputs = outputs
+        self.hidden = nn.Sequential(*layers)
+        self.activation = activation
+        self.size = inputs + size
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """(n, self.size) for observations (n, size)."""
+        return torch.cat([self.hidden(observation), observation], dim=-1)
+
+
+class Actor(nn.Module):
+    """Observation -> hidden layers -> [hidden, observation] -> linear -> tanh.
+
+    Args:
+        size: Entries of an observation.
+        action_size: Entries of an action.
+        hidden: Entries of each hidden layer.
+        activation: One of :data:`ACTIVATIONS`.
+    """
+
+    def __init__(self, size: int, action_size: int, hidden: Sequence[int], activation: str = "elu") -> None:
+        super().__init__()
+        self.latent = Latent(size, hidden, activation)
+        self.head = nn.Linear(self.latent.size, action_size)
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """(n, action_size) in (-1, 1) for observations (n, size)."""
+        action: torch.Tensor = torch.tanh(self.head(self.latent(observation)))
+        return action
+
+    def network(self) -> Network:
+        """The same in NumPy."""
+        return network_of_layers(self.latent, self.head)
+
+
+def network_of_layers(latent: Latent, head: nn.Linear) -> Network:
+    """Hidden layers and last layer as a network."""
+    linear = [layer for layer in latent.hidden if isinstance(layer, nn.Linear)] + [head]
+    return Network(
+        weights=tuple(_numpy(layer.weight) for layer in linear),
+        biases=tuple(_numpy(layer.bias) for layer in linear),
+        activation=latent.activation,  # type: ignore[arg-type]
+        squash="tanh",
+        skip=True,
+    )
+
+
+def load_layers(network: Network, latent: Latent, head: nn.Linear) -> None:
+    """Give hidden layers and last layer the weights of a network.
+
+    Raises:
+        DataError: the network is built in another way.
+    """
+    linear = [layer for layer in latent.hidden if isinstance(layer, nn.Linear)] + [head]
+    same = network.skip and network.squash == "tanh" and network.mean is None
+    shapes = [tuple(layer.weight.shape) for layer in linear]
+    if not same or network.activation != latent.activation or shapes != [w.shape for w in network.weights]:
+        raise DataError(
+            "initial: the agent's network is built in another way; use its hidden layers and activation, "
+            f"which are {[w.shape[0] for w in network.weights[:-1]]} and {network.activation}"
+        )
+    with torch.no_grad():
+        for layer, weight, bias in zip(linear, network.weights, network.biases, strict=True):
+            layer.weight.copy_(torch.from_numpy(weight.copy()))
+            layer.bias.copy_(torch.from_numpy(bias.copy()))
+
+
+def begin_at_rest(actor: Actor, batch: Batch) -> None:
+    """Make an actor a spring and damper to neutral, and next to nothing else.
+
+    So a training begins with a machine that stays in its travel, and moves at all: every gradient is useful.
+    """
+    hidden = actor.latent.size - batch.layout.frame
+    with torch.no_grad():
+        weight = torch.zeros_like(actor.head.weight)
+        weight[:, :hidden] = _QUIET * torch.randn(weight.shape[0], hidden)
+        weight[:, hidden:] = torch.from_numpy(_springs(batch.layout, batch.scale))
+        actor.head.weight.copy_(weight)
+        actor.head.bias.zero_()
+
+
+def _springs(layout: Layout, scale: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(9, frame) -w^2 x - 2 w v of each axis, as a share of its largest acceleration."""
+    gains = np.zeros((len(AXES), layout.frame))
+    rows = {row.name: row for row in layout.rows}
+    for first, position, rate, subsystem in (
+        (0, "carriage", "carriage_rate", "carriage"),
+        (2, "displacement", "velocity", "hexapod"),
+        (5, "beta", "beta_rate", "hexapod"),
+    ):
+        w = _SPRINGS[subsystem]
+        for k in range(rows[position].size):
+            gains[first + k, layout.first(position) + k] = -w * w * rows[position].scale
+            gains[first + k, layout.first(rate) + k] = -2.0 * w * rows[rate].scale
+    gains[8, layout.first("turntable_rate")] = -_TURNTABLE_DAMPING * rows["turntable_rate"].scale
+    moving = scale > 0.0
+    gains[moving] /= scale[moving, None]
+    gains[~moving] = 0.0
+    return gains.astype(np.float32)
+
+
+def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:
+    array: NDArray[np.float32] = tensor.detach().cpu().numpy().copy()
+    return array
