@@ -14,6 +14,7 @@ from motion_cueing.evaluation.provenance import package_version
 
 from .car import synthetic_log
 from .repository import PACKAGES, ROOT
+from .train import agents
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 NAMES = [page.relative_to(ROOT).as_posix() for page in PAGES]
@@ -34,11 +35,12 @@ def commands(text: str) -> list[list[str]]:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with the log that the examples speak of."""
+    """A folder with the log and the agent that the examples speak of."""
     truth = synthetic_log.drive()
     log = synthetic_log.Device(pitch=0.1, yaw=0.2).records(truth)
     log["t"], log["ay"], log["gps_speed"] = 1000.0 * log["t"], -log["ay"], 3.6 * log["v"]
     synthetic_log.write(tmp_path / "drive.csv", log)
+    agents.agent().save(tmp_path / "runs" / "first" / "best.safetensors")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -31,3 +31,14 @@ def test_policies_are_compared_best_first(tmp_path):
     assert set(table) == {"no-motion", "classical", "carriage-on-springs"}
     assert list(table.values()) == sorted(table.values())
     assert table["classical"] < table["no-motion"]
+
+
+def test_a_controller_of_ones_own_beats_standing_still(tmp_path):
+    lines = lines_of(ROOT / "examples" / "own_controller.py", tmp_path, "braking")
+    assert lines[0].split()[:3] == ["maneuver", "policy", "J"]
+    rows = [line.split() for line in lines[1:]]
+    found = {policy: (float(error), float(sensed)) for _, policy, error, sensed, *_ in rows}
+    assert set(found) == {"no-motion", "classical", "tilt-and-shove"}
+    assert found["tilt-and-shove"] < found["no-motion"]
+    assert found["tilt-and-shove"][1] < found["no-motion"][1]
+    assert found["no-motion"][0] == pytest.approx(7.41, abs=0.02)
