@@ -144,7 +144,7 @@ def _gif(first: Picture, rest: Iterable[Picture], rate: float) -> bytes:
         append_images=(indexed(frame) for frame in rest),
         duration=round(1000.0 / gif_rate(rate)),
         loop=0,
-        optimize=False,
+        optimize=True,
     )
     return buffer.getvalue()
 

@@ -97,7 +97,7 @@ def shell() -> Mesh:
     glass |= np.isin(interval, _SIDE_WINDOWS) & np.isin(segment, _WINDOW_FACES)
     _paint(body, glass, GLASS, gloss=0.9, opacity=_GLASS_OPACITY)
     _paint(body, np.isin(interval, (0, 1)) & np.isin(segment, _UPPER_SIDES), TAIL_LIGHT, gloss=0.2)
-    _paint(body, (interval == 12) & np.isin(segment, _UPPER_SIDES), HEADLIGHT, gloss=0.8)
+    _paint(body, np.isin(interval, (12, 13)) & np.isin(segment, _UPPER_SIDES), HEADLIGHT, gloss=0.8)
     return body
 
 
