@@ -21,7 +21,7 @@ from .from_sb3 import network_of
 from .hyperparameters import arguments
 from .learner import Boundary, State
 from .monitor import Monitor
-from .sb3_state import restore, state_of
+from .sb3_state import restore, restore_random, state_of
 from .vec_env import DrivingSimulatorVecEnv
 
 _NUMBER: Final = (int, float, np.number)
@@ -57,6 +57,7 @@ class SB3Learner:
         self.model = _model(algorithm, env, config, hyperparameters)
         self.model.set_logger(Logger(None, output_formats=[]))
         self.monitor = Monitor()
+        self._resumed: State | None = None
 
     @property
     def steps(self) -> int:
@@ -68,10 +69,19 @@ class SB3Learner:
         left = self._total - self.steps
         if left <= 0:
             return
-        callback = _Callback(boundary, self.monitor, self.simulators)
+        callback = _Callback(self._at(boundary), self.monitor, self.simulators)
         # No Generic method: the classes' own differ in the default of log_interval alone.
         learn: Any = self.model.learn
         learn(left, callback=callback, log_interval=None, reset_num_timesteps=False)
+
+    def _at(self, boundary: Boundary) -> Boundary:
+        def settled() -> None:
+            if self._resumed is not None:
+                restore_random(self._resumed, self.model)
+                self._resumed = None
+            boundary()
+
+        return settled
 
     def scalars(self) -> dict[str, float]:
         """Means over what was played since the last call, and what the update told last."""
@@ -96,6 +106,7 @@ class SB3Learner:
     def restore(self, state: State) -> None:
         """Go on from a state."""
         restore(state, self.model, self.simulators, self.normalize)
+        self._resumed = {"random": state["random"], "noise": state["noise"]}
         self.monitor.restore(state["monitor"])
         self.model.logger.name_to_value.update(state["told"])
 

@@ -1,6 +1,6 @@
 """Everything a Stable-Baselines3 training consists of, to go on from it bit for bit.
 
-Not in it: the noise matrices of an off-policy algorithm with ``use_sde``, and PyTorch's generator on a GPU.
+Not in it: PyTorch's generator on a GPU.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from .learner import State
 from .vec_env import DrivingSimulatorVecEnv
 
 _PLAIN: Final = ("num_timesteps", "_n_updates", "_episode_num")
+_NOISE: Final = ("exploration_mat", "exploration_matrices")
 _ARRAYS: Final = ("_last_obs", "_last_episode_starts", "_last_original_obs")
 
 
@@ -38,6 +39,7 @@ def state_of(
         "normalize": None if normalize is None else _statistics(normalize),
         "simulators": simulators.snapshot(),
         "random": _random(model),
+        "noise": {name: getattr(_noisy(model), name) for name in _NOISE} if _noisy(model) else {},
     }
 
 
@@ -58,7 +60,7 @@ def restore(
         if normalize is not None:
             _restore_statistics(state["normalize"], normalize)
         simulators.restore(state["simulators"])
-        _restore_random(state["random"], model)
+        restore_random(state, model)
     except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
         if isinstance(error, DataError):
             raise
@@ -124,10 +126,22 @@ def _random(model: BaseAlgorithm) -> dict[str, Any]:
     return {"numpy": [keys, *rest], "torch": torch.get_rng_state(), "space": _as_text(space)}
 
 
-def _restore_random(saved: State, model: BaseAlgorithm) -> None:
+def restore_random(state: State, model: BaseAlgorithm) -> None:
+    """Put random generators back; once more at the first rollout, before which ``use_sde`` draws noise."""
+    saved = state["random"]
     np.random.set_state(("MT19937", *saved["numpy"]))  # noqa: NPY002
     torch.set_rng_state(saved["torch"])
     model.action_space.np_random.bit_generator.state = _as_numbers(saved["space"])
+    for name, matrices in state["noise"].items():
+        setattr(_noisy(model), name, matrices)
+
+
+def _noisy(model: BaseAlgorithm) -> Any:
+    """The distribution that holds noise over a rollout, or None."""
+    if not getattr(model, "use_sde", False):
+        return None
+    policy: Any = model.policy
+    return policy.actor.action_dist if isinstance(model, OffPolicyAlgorithm) else policy.action_dist
 
 
 def _as_text(state: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 
-INSTALLED = all(importlib.util.find_spec(name) for name in ("torch", "stable_baselines3"))
+NEEDED = ("torch", "stable_baselines3", "sb3_contrib", "optuna", "tensorboard")
+INSTALLED = all(importlib.util.find_spec(name) for name in NEEDED)
 
 collect_ignore_glob = [] if INSTALLED else ["test_*.py"]

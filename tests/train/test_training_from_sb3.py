@@ -1,0 +1,111 @@
+"""Networks of Stable-Baselines3's models act as the models do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from stable_baselines3 import PPO
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.vec_env import VecNormalize
+
+from motion_cueing.envs.errors import DataError
+from motion_cueing.envs.task import ObservationOptions
+from motion_cueing.envs.task.layout import layout_of
+from motion_cueing.train.from_sb3 import network_of
+from motion_cueing.train.sb3_learner import CLASSES
+from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
+
+from ..env.tasks import SHORT
+
+ROWS = 500
+SIZE = layout_of(ObservationOptions(), "acceleration", 9).size
+
+
+def shaken(model) -> None:
+    """Weights as large as after a training: new ones hardly leave the neighbourhood of zero."""
+    generator = torch.Generator().manual_seed(3)
+    with torch.no_grad():
+        for parameter in model.policy.parameters():
+            parameter += 0.2 * torch.randn(parameter.shape, generator=generator)
+
+
+def make(name: str, normalized: bool = True, **policy):
+    """A model with its normalisation."""
+    env = DrivingSimulatorVecEnv(2, episode=SHORT)
+    env = VecNormalize(env, clip_obs=3.0) if normalized else env
+    if normalized:
+        rng = np.random.default_rng(1)
+        env.obs_rms.update(rng.normal(0.3, rng.uniform(0.01, 2.0, SIZE), (50, SIZE)))
+    model = CLASSES[name]("MlpPolicy", env, policy_kwargs={"net_arch": [16, 12], **policy}, seed=1)
+    shaken(model)
+    return model, env if normalized else None
+
+
+def observations(size: int) -> np.ndarray:
+    return np.random.default_rng(2).normal(0.0, 2.0, (ROWS, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("normalized", [False, True])
+@pytest.mark.parametrize("name", CLASSES)
+def test_it_predicts_what_the_model_does(name, normalized):
+    model, normalize = make(name, normalized)
+    network = network_of(model, normalize)
+    seen = observations(network.size)
+    expected, _ = model.predict(normalize.normalize_obs(seen) if normalize else seen, deterministic=True)
+    assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
+    inside = np.abs(expected) < 1.0
+    assert inside.mean() > 0.2
+    assert np.std(expected[inside]) > 0.1
+
+
+@pytest.mark.parametrize("activation", [torch.nn.Tanh, torch.nn.ReLU, torch.nn.ELU, torch.nn.SiLU])
+@pytest.mark.parametrize("name", ["ppo", "sac"])
+def test_activations_are_the_models(name, activation):
+    model, normalize = make(name, activation_fn=activation)
+    seen = observations(SIZE)
+    expected, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
+    assert np.allclose(network_of(model, normalize)(seen), expected, rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_policy_without_hidden_layers_is_one_layer(name):
+    model, normalize = make(name, net_arch=[] if name == "ppo" else [5])
+    network = network_of(model, normalize)
+    assert len(network.weights) == (1 if name == "ppo" else 2)
+    seen = observations(SIZE)
+    expected, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
+    assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
+
+
+def test_the_network_does_not_change_with_the_model():
+    model, normalize = make("ppo")
+    network = network_of(model, normalize)
+    before = network(observations(SIZE))
+    shaken(model)
+    normalize.obs_rms.update(np.ones((10, SIZE)))
+    assert np.array_equal(network(observations(SIZE)), before)
+
+
+class Twice(BaseFeaturesExtractor):
+    """Something a network cannot hold."""
+
+    def __init__(self, space: spaces.Box) -> None:
+        super().__init__(space, space.shape[0])
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return 2.0 * x
+
+
+@pytest.mark.parametrize(
+    ("policy", "message"),
+    [
+        ({"features_extractor_class": Twice}, "features extractor"),
+        ({"activation_fn": torch.nn.Softsign}, "layers Softsign; a network has one of tanh"),
+    ],
+)
+def test_what_a_network_cannot_hold_is_refused(policy, message):
+    model = PPO("MlpPolicy", DrivingSimulatorVecEnv(2, episode=SHORT), policy_kwargs=policy)
+    with pytest.raises(DataError, match=message):
+        network_of(model)
