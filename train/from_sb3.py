@@ -1,4 +1,4 @@
-"""The deterministic policy of a Stable-Baselines3 model as a network that needs no PyTorch."""
+"""The deterministic policy of a Stable-Baselines3 model as a network that needs no PyTorch, and back."""
 
 from __future__ import annotations
 
@@ -46,6 +46,52 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         variance=variance,
         clip=clip,
     )
+
+
+def load_network(
+    network: Network, model: BaseAlgorithm, normalize: VecNormalize | None, weight: float
+) -> None:
+    """Give a model the deterministic policy of a network.
+
+    Args:
+        network: Of a model built in the same way.
+        model: Its policy is changed, its critics stay as they are.
+        normalize: The wrapper around its environment; takes over mean and variance.
+        weight: Observations that mean and variance are counted for; new ones move them on.
+
+    Raises:
+        DataError: the network is built in another way.
+    """
+    layers, squash = _actor(model)
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    ours = ([tuple(layer.weight.shape) for layer in linear], _activation(layers), squash, False)
+    theirs = [w.shape for w in network.weights], network.activation, network.squash == "tanh", network.skip
+    if ours != theirs:
+        raise DataError(
+            "initial: the agent's network is built in another way; it has hidden layers "
+            f"{[w.shape[0] for w in network.weights[:-1]]} and activation {network.activation}"
+            f"{', its last layer also sees the observation' if network.skip else ''}, and ends with "
+            f"{network.squash}"
+        )
+    _load_statistics(network, normalize, weight)
+    with torch.no_grad():
+        for layer, values, bias in zip(linear, network.weights, network.biases, strict=True):
+            layer.weight.copy_(torch.from_numpy(values.copy()))
+            layer.bias.copy_(torch.from_numpy(bias.copy()))
+    target = getattr(model.policy, "actor_target", None)
+    if target is not None:
+        target.load_state_dict(model.policy.actor.state_dict())  # type: ignore[union-attr]
+
+
+def _load_statistics(network: Network, normalize: VecNormalize | None, weight: float) -> None:
+    normalized = normalize is not None and normalize.norm_obs
+    if normalized != (network.mean is not None):
+        wanted = "true" if network.mean is not None else "false"
+        raise DataError(f"initial: the agent was trained with normalize.observation {wanted}; set it so")
+    if normalize is not None and network.mean is not None and network.variance is not None:
+        statistics: Any = normalize.obs_rms
+        statistics.mean, statistics.var = network.mean.copy(), network.variance.copy()
+        statistics.count = weight
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool]:

@@ -17,14 +17,17 @@ from ..envs.errors import ConfigurationError
 from .agent import Network
 from .base_policy import base_policy
 from .config import TrainingConfig
-from .from_sb3 import network_of
+from .from_sb3 import load_network, network_of
 from .hyperparameters import arguments
+from .initial import initial_network
 from .learner import Boundary, State
 from .monitor import Monitor
 from .sb3_state import restore, restore_random, state_of
 from .vec_env import DrivingSimulatorVecEnv
 
 _NUMBER: Final = (int, float, np.number)
+_INITIAL_WEIGHT: Final = 1e5
+"""Observations that the normalisation of an initial agent counts for."""
 CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 
 
@@ -55,6 +58,9 @@ class SB3Learner:
         (size,) = self.simulators.action_space.shape or (0,)
         hyperparameters = arguments(algorithm, config.hyperparameters, size)
         self.model = _model(algorithm, env, config, hyperparameters)
+        initial = initial_network(config)
+        if initial is not None:
+            load_network(initial, self.model, self.normalize, _INITIAL_WEIGHT)
         self.model.set_logger(Logger(None, output_formats=[]))
         self.monitor = Monitor()
         self._resumed: State | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +85,9 @@ class Training:
     def __init__(self, run: RunFolder, tell: Tell = lambda status: None) -> None:
         self.run, self.config, self._tell = run, run.config, tell
         state = run.last_checkpoint()
-        self.learner: Learner = make_learner(run.config)
+        # A checkpoint goes before the agent that the training began with, which may be gone by now.
+        config = run.config if state is None else replace(run.config, initial=None)
+        self.learner: Learner = make_learner(config)
         self.validation = Validation(run.config)
         self._clock, self._seen = _Clock(), -1
         self._interrupt = Interrupt()

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.task import ObservationOptions
 from motion_cueing.envs.task.layout import layout_of
-from motion_cueing.train.from_sb3 import network_of
+from motion_cueing.train.from_sb3 import load_network, network_of
 from motion_cueing.train.sb3_learner import CLASSES
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
@@ -86,6 +86,38 @@ def test_the_network_does_not_change_with_the_model():
     shaken(model)
     normalize.obs_rms.update(np.ones((10, SIZE)))
     assert np.array_equal(network(observations(SIZE)), before)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_model_takes_over_a_network(name):
+    network = network_of(*make(name))
+    other, normalize = make(name)
+    shaken(other)
+    normalize.obs_rms.update(np.ones((10, SIZE)))
+    assert not np.allclose(network_of(other, normalize)(observations(SIZE)), network(observations(SIZE)))
+    load_network(network, other, normalize, 100.0)
+    assert np.array_equal(network_of(other, normalize)(observations(SIZE)), network(observations(SIZE)))
+    assert normalize.obs_rms.count == 100.0
+    if name == "td3":
+        for one, two in zip(
+            other.policy.actor.parameters(), other.policy.actor_target.parameters(), strict=True
+        ):
+            assert torch.equal(one, two)
+
+
+@pytest.mark.parametrize(
+    ("name", "normalized", "policy", "message"),
+    [
+        ("ppo", True, {"net_arch": [16, 11]}, r"it has hidden layers \[16, 12\] and activation tanh"),
+        ("ppo", True, {"activation_fn": torch.nn.ReLU}, "and activation tanh, and ends with clip"),
+        ("sac", True, {"activation_fn": torch.nn.Tanh}, "ends with clip"),
+        ("ppo", False, {}, "trained with normalize.observation true; set it so"),
+    ],
+)
+def test_a_network_that_does_not_fit_is_not_taken_over(name, normalized, policy, message):
+    network = network_of(*make("ppo"))
+    with pytest.raises(DataError, match=message):
+        load_network(network, *make(name, normalized, **policy), 1.0)
 
 
 class Twice(BaseFeaturesExtractor):

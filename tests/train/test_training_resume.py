@@ -103,6 +103,25 @@ def test_a_training_that_is_complete_stays_as_it_is_and_can_be_lengthened(tmp_pa
     assert RunFolder.open(folder.path).config.steps == 400
 
 
+@pytest.mark.parametrize("algo", ["ppo", "td3"])
+def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
+    first = RunFolder.create(tmp_path / "first", tiny.config(tmp_path, algo))
+    Training(first).train()
+    config = tiny.config(tmp_path, algo, initial=str(first.final_agent), seed=8)
+    second = RunFolder.create(tmp_path / "second", config)
+    network = Agent.load(first.final_agent).network
+    seen = np.random.default_rng(0).normal(size=(50, network.size)).astype(np.float32)
+    training = Training(second)
+    assert np.array_equal(training.learner.network()(seen), network(seen))
+    training.train()
+    assert not np.array_equal(Agent.load(second.final_agent).network(seen), network(seen))
+    # What is resumed no longer needs the agent it began with.
+    first.final_agent.unlink()
+    longer = RunFolder.open(second.path)
+    longer.extend(400)
+    assert not Training(longer).train().interrupted
+
+
 def test_only_the_latest_checkpoints_are_kept(tmp_path):
     config = tiny.config(tmp_path, "ppo", checkpoints={"every": 64, "keep": 3})
     folder = RunFolder.create(tmp_path / "run", config)
