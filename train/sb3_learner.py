@@ -112,7 +112,7 @@ class SB3Learner:
     def restore(self, state: State) -> None:
         """Go on from a state."""
         restore(state, self.model, self.simulators, self.normalize)
-        self._resumed = {"random": state["random"], "noise": state["noise"]}
+        self._resumed = {name: state[name] for name in ("random", "noise", "walks")}
         self.monitor.restore(state["monitor"])
         self.model.logger.name_to_value.update(state["told"])
 

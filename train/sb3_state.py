@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise, VectorizedActionNoise
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
@@ -40,6 +41,7 @@ def state_of(
         "simulators": simulators.snapshot(),
         "random": _random(model),
         "noise": {name: getattr(_noisy(model), name) for name in _NOISE} if _noisy(model) else {},
+        "walks": [walk.noise_prev.copy() for walk in _walks(model)],
     }
 
 
@@ -127,13 +129,23 @@ def _random(model: BaseAlgorithm) -> dict[str, Any]:
 
 
 def restore_random(state: State, model: BaseAlgorithm) -> None:
-    """Put random generators back; once more at the first rollout, before which ``use_sde`` draws noise."""
+    """Put noise and random generators back; once more at the first rollout, before which others are drawn."""
     saved = state["random"]
     np.random.set_state(("MT19937", *saved["numpy"]))  # noqa: NPY002
     torch.set_rng_state(saved["torch"])
     model.action_space.np_random.bit_generator.state = _as_numbers(saved["space"])
     for name, matrices in state["noise"].items():
         setattr(_noisy(model), name, matrices)
+    # A model that has not learned yet has one noise for all environments.
+    for walk, before in zip(_walks(model), state["walks"], strict=False):
+        walk.noise_prev = before.copy()
+
+
+def _walks(model: BaseAlgorithm) -> list[OrnsteinUhlenbeckActionNoise]:
+    """Action noises that remember; learning begins with forgetting."""
+    noise = getattr(model, "action_noise", None)
+    noises = noise.noises if isinstance(noise, VectorizedActionNoise) else [noise]
+    return [one for one in noises if isinstance(one, OrnsteinUhlenbeckActionNoise)]
 
 
 def _noisy(model: BaseAlgorithm) -> Any:

@@ -53,6 +53,8 @@ CASES = {
     **{name: (name, {}) for name in tiny.ALGORITHMS},
     "full replay buffer": ("sac", {"hyperparameters": {"buffer_size": 60}}),
     "several steps": ("tqc", {"hyperparameters": {"train_freq": 3, "gradient_steps": 2}}),
+    "returns of several steps": ("sac", {"hyperparameters": {"n_steps": 3}}),
+    "noise that remembers": ("td3", {"hyperparameters": {"noise_type": "ornstein-uhlenbeck"}}),
     "schedules": ("ppo", {"hyperparameters": {"learning_rate": "lin_1e-3", "clip_range": "lin_0.2"}}),
     "residual": ("ppo", {"task": {"action": {"mode": "residual"}}}),
     "gains": ("ppo", {"task": {"action": {"mode": "gains"}}}),
