@@ -1,4 +1,4 @@
-"""Random drives for training: seeded, of any length, on urban, rural and highway roads."""
+"""Random drives for training: seeded, of any length, on urban, rural and highway roads, and on a track."""
 
 from __future__ import annotations
 
@@ -38,17 +38,19 @@ class RandomDrives:
         urban: Relative frequency of urban drives.
         rural: Of rural drives.
         highway: Of highway drives.
+        track: Of fierce drives on a handling track.
         cars: Cars to draw from, by name.
     """
 
     urban: NonNegative = 0.5
     rural: NonNegative = 0.3
     highway: NonNegative = 0.2
+    track: NonNegative = 0.0
     cars: Annotated[tuple[str, ...], Field(min_length=1)] = ("sedan",)
 
     def __post_init__(self) -> None:
-        if self.urban + self.rural + self.highway <= 0.0:
-            raise ValueError("one of urban, rural and highway must be positive")
+        if sum(getattr(self, kind) for kind in KINDS) <= 0.0:
+            raise ValueError(f"one of {', '.join(KINDS)} must be positive")
         for name in self.cars:
             if name not in car_names():
                 raise ValueError(str(UnknownNameError("car", name, car_names())))
@@ -89,7 +91,7 @@ def random_drive(
     Args:
         seed: The same seed gives the same drive.
         duration: 0.1 s to a day, s.
-        kind: "urban", "rural" or "highway"; drawn if None.
+        kind: "urban", "rural", "highway" or "track"; drawn if None.
         car: Drawn from ``drives.cars`` if None.
         drives: What to draw from.
 

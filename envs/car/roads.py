@@ -88,8 +88,22 @@ KINDS: Final = {
         grade=(0.0, 0.03),
         events={"bend": 3, "slow": 2.5, "lane_change": 3},
     ),
+    "track": RoadKind(
+        speed=(35 * KMH, 100 * KMH),
+        accelerate=(1.5, 3.5),
+        brake=(3.0, 6.0),
+        lateral=(2.0, 4.0),
+        straight=(5.0, 80.0),
+        radius=(15.0, 200.0),
+        angle=(0.3, 1.6),
+        transition=(10.0, 25.0),
+        lane_change=(2.4, 4.0),
+        grade=(0.0, 0.02),
+        events={"bend": 3, "corner": 2, "stop": 1, "slow": 2, "lane_change": 3, "roundabout": 1, "weave": 2},
+    ),
 }
-"""Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers."""
+"""Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers; on the
+handling track those of a test driver."""
 
 CORNER_RADIUS: Final[Range] = (9.0, 18.0)
 """Of a right-angled turn at a crossing, m."""
@@ -99,6 +113,14 @@ ROUNDABOUT_RADIUS: Final[Range] = (14.0, 25.0)
 
 LANE_WIDTH: Final[Range] = (2.8, 3.75)
 """m."""
+
+WEAVE_PERIOD: Final[Range] = (2.6, 4.5)
+"""Of a weave at the limit, s."""
+
+WEAVE_PERIODS: Final[Range] = (2.0, 5.0)
+
+WEAVE_WIDTH: Final[Range] = (0.4, 1.2)
+"""Amplitude of a weave, m."""
 
 
 @dataclass
@@ -181,6 +203,15 @@ def add_lane_change(road: Road) -> None:
     road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length))
 
 
+def add_weave(road: Road) -> None:
+    """To and fro within the road, some periods of a sine of curvature."""
+    length = road.draw(WEAVE_PERIOD) * road.limit
+    stations = np.arange(0.0, length * round(road.draw(WEAVE_PERIODS)), STEP)
+    # The car sways by peak (length / 2 pi)^2 to either side.
+    peak = road.draw(WEAVE_WIDTH) * (2.0 * np.pi / length) ** 2
+    road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length))
+
+
 def add_roundabout(road: Road) -> None:
     """Round a roundabout to one of its exits (traffic on the right)."""
     deflection = road.draw((0.6, 1.0))
@@ -198,5 +229,6 @@ EVENTS: Final[dict[str, Callable[[Road], None]]] = {
     "slow": add_slow,
     "lane_change": add_lane_change,
     "roundabout": add_roundabout,
+    "weave": add_weave,
 }
 """What can happen on a road, by name."""

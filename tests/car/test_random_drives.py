@@ -9,7 +9,8 @@ from motion_cueing.envs.car import RandomDrives, drive_seeds, get_car, random_dr
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 
-KINDS = ("urban", "rural", "highway")
+ROADS = ("urban", "rural", "highway")
+KINDS = (*ROADS, "track")
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_same_seed_same_drive_and_another_seed_another():
 
 def test_all_drives_of_a_batch_differ(batches):
     ends = {tuple(trace.specific_force[-1]) for kind in KINDS for trace in batches[kind]}
-    assert len(ends) == 72
+    assert len(ends) == 96
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -44,7 +45,8 @@ def test_each_begins_calm_and_lasts_as_long_as_asked(batches, kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "side", "along"), [("urban", 3.9, 3.6), ("rural", 3.9, 3.2), ("highway", 2.2, 2.3)]
+    ("kind", "side", "along"),
+    [("urban", 3.9, 3.6), ("rural", 3.9, 3.2), ("highway", 2.2, 2.3), ("track", 7.5, 7.0)],
 )
 def test_accelerations_are_those_of_drivers(batches, kind, side, along):
     force = np.concatenate([trace.specific_force for trace in batches[kind]])
@@ -74,7 +76,7 @@ def test_urban_drives_stop_and_turn_both_ways(batches):
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(2.0, 40.0),
-    st.sampled_from(KINDS),
+    st.sampled_from(ROADS),
     st.sampled_from(["bmw-320i", "volvo-v40"]),
 )
 def test_any_seed_can_be_driven(seed, duration, kind, car):
@@ -82,6 +84,15 @@ def test_any_seed_can_be_driven(seed, duration, kind, car):
     assert trace.duration == pytest.approx(duration, abs=0.006)
     assert np.abs(trace.channels["path_offset_m"]).max() < 0.6
     assert np.abs(trace.specific_force[:, :2]).max() < 5.0
+
+
+def test_the_track_is_fiercer_than_any_road_and_the_car_stays_on_it(batches):
+    def spread(kind):
+        return np.concatenate([trace.specific_force[:, :2] for trace in batches[kind]]).std()
+
+    assert spread("track") > 1.3 * max(spread(kind) for kind in ROADS)
+    offsets = [np.abs(trace.channels["path_offset_m"]).max() for trace in batches["track"]]
+    assert max(offsets) < 1.0
 
 
 def test_kinds_follow_their_shares():
