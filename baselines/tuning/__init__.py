@@ -1,0 +1,1 @@
+"""Searches for the parameters of a motion cueing algorithm: each algorithm at its best."""

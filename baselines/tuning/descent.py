@@ -1,0 +1,146 @@
+"""Descent along the gradient of J through washout and machine, by Warp's tape.
+
+Adam (Kingma and Ba, "Adam: A Method for Stochastic Optimization") on a few drives at a time. J says
+nothing of a limit before it is met: now and then the set is tried on all drives, and one that is no better
+than the best goes back there with half the step.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import warp as wp
+from numpy.lib.recfunctions import structured_to_unstructured
+from numpy.typing import NDArray
+
+from ..washout.batch import WashoutBatch
+from ..washout.policy import kernel_parameters
+from ..washout.step import Parameters
+from .method import Found
+from .objective import Objective
+from .space import WashoutSpace
+
+Floats = NDArray[np.float64]
+
+STEP: Final = 0.02
+"""First step of Adam, of the unit cube."""
+SMALLEST_STEP: Final = 1e-4
+"""A step that is halved below this has converged."""
+DRIVES: Final = 32
+"""Drives of one gradient, drawn anew each time."""
+TRY_EVERY: Final = 5
+"""Gradients between trials on all drives."""
+_DECAY: Final = (0.8, 0.95)
+"""Of Adam's two moments: a search has some hundred steps, not a million."""
+_TINY: Final = 1e-8
+_DIFFERENCE: Final = 1e-5
+"""Half the difference from which the derivative of the kernel's parameters by place is taken."""
+
+
+class Descent:
+    """Adam in the unit cube, held to what is no worse on all drives.
+
+    Args:
+        start: (dimension,) where to begin.
+        seed: Of the drives that are drawn.
+    """
+
+    def __init__(self, start: Floats, seed: int) -> None:
+        self._seed = seed
+        self._place = np.array(start)
+        self._step, self._count = STEP, 0
+        self._forget()
+        self._best: tuple[float, Floats] | None = None
+
+    def _forget(self) -> None:
+        self._mean, self._square, self._since = np.zeros_like(self._place), np.zeros_like(self._place), 0
+
+    @property
+    def best(self) -> tuple[float, Floats] | None:
+        """Lowest cost on all drives and its place."""
+        return self._best
+
+    @property
+    def converged(self) -> bool:
+        """Whether the steps have become too small to matter."""
+        return self._step < SMALLEST_STEP
+
+    @property
+    def _tries(self) -> bool:
+        return self._count % (TRY_EVERY + 1) == 0
+
+    def measure(self, space: WashoutSpace, objective: Objective) -> Found:
+        """The cost on all drives, or J and its gradient on a few of them."""
+        if self._tries:
+            whole = objective.judge([space.decode(self._place)])
+            return Found(objective.hours(), tuple(whole.cost.tolist()))
+        drawn = objective.draw(DRIVES, (self._seed, self._count))
+        cost, gradient = place_gradient(space, self._place, objective, drawn)
+        return Found(objective.hours(drawn), (cost, *gradient.tolist()))
+
+    def tell(self, found: Found) -> None:
+        """Compare with the best, or go one step down."""
+        if self._tries:
+            self._compare(found.values[0])
+        else:
+            self._descend(np.array(found.values[1:]))
+        self._count += 1
+
+    def _compare(self, cost: float) -> None:
+        if self._best is None or cost < self._best[0]:
+            self._best = cost, self._place.copy()
+            return
+        self._place = self._best[1].copy()
+        self._step *= 0.5
+        self._forget()
+
+    def _descend(self, gradient: Floats) -> None:
+        self._since += 1
+        self._mean += (1.0 - _DECAY[0]) * (gradient - self._mean)
+        self._square += (1.0 - _DECAY[1]) * (gradient**2 - self._square)
+        mean = self._mean / (1.0 - _DECAY[0] ** self._since)
+        square = self._square / (1.0 - _DECAY[1] ** self._since)
+        self._place = np.clip(self._place - self._step * mean / (np.sqrt(square) + _TINY), 0.0, 1.0)
+
+
+def place_gradient(
+    space: WashoutSpace, place: Floats, objective: Objective, drawn: list[int]
+) -> tuple[float, Floats]:
+    """Mean J over whole drives, and its gradient (dimension,) in the place.
+
+    Args:
+        space: The unit cube.
+        place: (dimension,) in it.
+        objective: Has machine and drives.
+        drawn: Which drives; of those of different length as much as the shortest has.
+    """
+    drives = [objective.drives[i] for i in drawn]
+    batch = WashoutBatch([space.decode(place)], drives, objective.platform)
+    steps = min(len(drive) for drive in drives) - 1
+    cost, gradient = batch.gradient(steps)
+    inner = _flat(gradient)[0]
+    slopes = _kernel_slopes(space, place, objective)
+    used = slopes != 0.0
+    return float(cost[0]), np.array([row[on] @ inner[on] for row, on in zip(slopes, used, strict=True)])
+
+
+def _kernel_slopes(space: WashoutSpace, place: Floats, objective: Objective) -> Floats:
+    """(dimension, parameters of the kernel) derivatives of the latter by the places, one-sided at a face."""
+    rows = []
+    for axis in range(len(space)):
+        ends = np.clip(place[axis] + np.array([-_DIFFERENCE, _DIFFERENCE]), 0.0, 1.0)
+        moved = [np.where(np.arange(len(space)) == axis, end, place) for end in ends]
+        sides = [_kernel_values(space, one, objective) for one in moved]
+        rows.append((sides[1] - sides[0]) / (ends[1] - ends[0]))
+    return np.array(rows)
+
+
+def _kernel_values(space: WashoutSpace, place: Floats, objective: Objective) -> Floats:
+    parameters = kernel_parameters(space.decode(place), objective.platform.cab)
+    values: Floats = _flat(wp.array([parameters], dtype=Parameters, device="cpu").numpy())[0]
+    return values
+
+
+def _flat(values: NDArray[Any]) -> Floats:
+    return np.asarray(structured_to_unstructured(values, dtype=np.float64))

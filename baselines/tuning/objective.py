@@ -1,0 +1,106 @@
+"""What a search minimises: J over drives, in which no limit of the machine is met."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...envs.cues import CueTrace
+from ...envs.errors import ConfigurationError
+from ...envs.platform import Platform
+from ..washout import WashoutParameters
+from ..washout.batch import WashoutBatch
+
+Floats = NDArray[np.float64]
+Measure = Literal["J", "perceived"]
+"""What is averaged over the drives: J, or J of what the driver senses."""
+
+LIMIT_STEP: Final = 1.0
+"""Added to J of a set that meets a limit anywhere, however briefly."""
+LIMIT_SLOPE: Final = 1000.0
+"""Times the share of time at a limit, and added, too: 0.1 % costs 1, so that the way back is downhill."""
+_BROKEN: Final = 1e9
+"""In place of a J that is not finite."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What was found about parameter sets, each (sets,).
+
+    Args:
+        cue_error: Mean J of the drives.
+        perceived_error: Mean perceived J.
+        at_limit: Share of time in which any limit is met.
+        cost: What the search minimises.
+        limited: (sets, drives) share of time in which any limit is met.
+    """
+
+    cue_error: Floats
+    perceived_error: Floats
+    at_limit: Floats
+    cost: Floats
+    limited: Floats
+
+
+class Objective:
+    """Mean cost of parameter sets over drives; every drive counts the same.
+
+    Args:
+        drives: Cue traces of the same time step.
+        platform: The machine, without lag or dead time.
+        measure: What is minimised.
+        threads: Launches side by side.
+
+    Raises:
+        ConfigurationError: there is no drive.
+    """
+
+    def __init__(
+        self, drives: Sequence[CueTrace], platform: Platform, measure: Measure = "J", threads: int = 1
+    ) -> None:
+        if not drives:
+            raise ConfigurationError("drives is empty; a search needs at least one drive")
+        self.drives, self.platform, self.measure, self.threads = list(drives), platform, measure, threads
+
+    def judge(
+        self,
+        sets: Sequence[WashoutParameters],
+        drives: Sequence[int] | None = None,
+        guards: Sequence[int] = (),
+    ) -> Judgement:
+        """Every set through drives, in one launch.
+
+        Args:
+            sets: Parameter sets.
+            drives: Which drives J is averaged over; default: all.
+            guards: Further drives in which no limit may be met either.
+        """
+        counted = list(range(len(self.drives))) if drives is None else list(drives)
+        driven = [self.drives[i] for i in [*counted, *guards]]
+        scores = WashoutBatch(sets, driven, self.platform).scores(threads=self.threads)
+        cue = scores.cue_error[:, : len(counted)].mean(axis=1)
+        perceived = scores.perceived_error[:, : len(counted)].mean(axis=1)
+        at_limit = scores.at_limit.mean(axis=1)
+        cost = (cue if self.measure == "J" else perceived) + penalty(at_limit)
+        cost = np.nan_to_num(cost, nan=_BROKEN, posinf=_BROKEN)
+        return Judgement(cue, perceived, at_limit, cost, scores.at_limit)
+
+    def hours(self, drives: Sequence[int] | None = None) -> float:
+        """Simulated time of one set through drives, default all, h."""
+        driven = self.drives if drives is None else [self.drives[i] for i in drives]
+        return float(sum(len(drive) * drive.dt for drive in driven)) / 3600.0
+
+    def draw(self, count: int, seed: tuple[int, int]) -> list[int]:
+        """``count`` of the drives, or all if there are no more; the same for the same seed."""
+        count = min(count, len(self.drives))
+        drawn = np.random.default_rng(seed).choice(len(self.drives), size=count, replace=False)
+        return sorted(int(i) for i in drawn)
+
+
+def penalty(at_limit: Floats) -> Floats:
+    """What time at a limit costs: nothing without, else more than what it could gain."""
+    return np.asarray(np.where(at_limit > 0.0, LIMIT_STEP + LIMIT_SLOPE * at_limit, 0.0))

@@ -1,0 +1,169 @@
+"""A search from its beginning or from its file to the end of its budget."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...envs.errors import DataError
+from ...envs.settings import configuration, from_dict, to_dict
+from ...envs.storage import write_text
+from ..washout import WashoutParameters
+from .descent import Descent
+from .evolution import Evolution
+from .method import Found, Method
+from .objective import Objective
+from .options import TuningOptions
+from .space import WashoutSpace
+
+Floats = NDArray[np.float64]
+
+
+@configuration
+class Record:
+    """What the file of a search holds: enough to repeat it to the same bits without simulating anything.
+
+    Args:
+        options: Of the search.
+        platform: Name or file of the machine.
+        car: Name or file of the car.
+        inputs: Checksum of drives and machine.
+        found: What its steps found.
+    """
+
+    options: TuningOptions
+    platform: str
+    car: str
+    inputs: str
+    found: tuple[Found, ...] = ()
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a search is.
+
+    Args:
+        hours: Simulated so far, h.
+        best: Lowest cost so far; None before the first.
+        steps: Generations, or gradients and trials.
+    """
+
+    hours: float
+    best: float | None
+    steps: int
+
+
+class Search:
+    """A search for the best parameters.
+
+    Args:
+        options: Of the search.
+        objective: What it minimises; its drives are those of the options.
+        names: Of platform and car, as the file holds them.
+        path: File that is written after every step; None for none.
+    """
+
+    def __init__(
+        self,
+        options: TuningOptions,
+        objective: Objective,
+        names: tuple[str, str] = ("paper", "sedan"),
+        path: Path | None = None,
+    ) -> None:
+        self.options, self.objective, self.path = options, objective, path
+        self.space = WashoutSpace(options.start)
+        self.found: list[Found] = []
+        self._names, self._inputs = names, checksum(objective)
+        self._method = _method(options, self.space)
+
+    def resume(self, record: Record) -> None:
+        """Go through the steps of an earlier session again, without simulating.
+
+        Raises:
+            DataError: the drives or the machine have changed since, or the record does not fit.
+        """
+        if record.inputs != self._inputs:
+            raise DataError("drives or machine have changed since this search was begun; begin it anew")
+        try:
+            for found in record.found:
+                self._take(found)
+        except ValueError as error:
+            raise DataError(f"the record of this search does not fit its options ({error})") from None
+
+    def run(
+        self, tell: Callable[[Status], None] = lambda status: None, stop: Callable[[], bool] = lambda: False
+    ) -> bool:
+        """Search until the budget is spent or nothing more is found; returns whether ``stop`` ended it."""
+        tell(self.status)
+        while self.status.hours < self.options.budget and not self._method.converged:
+            if stop():
+                return True
+            self._take(self._method.measure(self.space, self.objective))
+            self.save()
+            tell(self.status)
+        return False
+
+    def _take(self, found: Found) -> None:
+        self._method.tell(found)
+        self.found.append(found)
+
+    @property
+    def status(self) -> Status:
+        """How far it is."""
+        best = self._method.best
+        hours = sum(found.hours for found in self.found)
+        return Status(hours, None if best is None else best[0], len(self.found))
+
+    @property
+    def converged(self) -> bool:
+        """Whether it ended, or would end, before its budget."""
+        return self._method.converged
+
+    def result(self, name: str, description: str) -> WashoutParameters:
+        """The best set found, or the start before the first step."""
+        best = self._method.best
+        place = self.space.encode(self.options.start) if best is None else best[1]
+        return self.space.result(place, name, description)
+
+    def save(self) -> None:
+        """Write the file, whole or not at all."""
+        if self.path is not None:
+            record = Record(self.options, *self._names, self._inputs, tuple(self.found))
+            write_text(self.path, json.dumps(to_dict(record)) + "\n")
+
+
+def load_record(path: Path) -> Record:
+    """The file of a search.
+
+    Raises:
+        DataError: there is none, or it is broken.
+        ConfigurationError: a field of it is wrong.
+    """
+    try:
+        values: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: no search can be read ({error})") from None
+    return from_dict(Record, values, str(path))
+
+
+def checksum(objective: Objective) -> str:
+    """Of drives and machine."""
+    sum_ = hashlib.sha256(json.dumps(to_dict(objective.platform), sort_keys=True).encode())
+    for drive in objective.drives:
+        sum_.update(np.ascontiguousarray(drive.specific_force).tobytes())
+        sum_.update(np.ascontiguousarray(drive.angular_velocity).tobytes())
+    return sum_.hexdigest()
+
+
+def _method(options: TuningOptions, space: WashoutSpace) -> Method:
+    begin = space.encode(options.start)
+    if options.method == "gradient":
+        return Descent(begin, options.seed)
+    return Evolution(begin, options.seed)

@@ -1,0 +1,217 @@
+"""``motion-cueing tune``: find the parameters with which an algorithm is at its best."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+import yaml
+from tyro.conf import FlagCreatePairsOff, Positional, arg
+
+from ..envs.cues import CueTrace
+from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.settings import to_dict
+from ..envs.storage import write_text
+from ..train.interrupt import Interrupt
+from ..train.provenance import command_line, commit, hardware, now, versions
+from .selection import find_car, find_maneuvers, find_platform
+from .tune_progress import TuningProgress
+
+if TYPE_CHECKING:
+    from ..baselines.tuning.objective import Objective
+    from ..baselines.tuning.options import TuningOptions
+    from ..baselines.tuning.search import Record, Search
+    from ..baselines.washout import WashoutParameters
+    from ..envs.car import Car
+
+_SUCCESS: Final = 0
+_INTERRUPTED: Final = 130
+_ALGORITHMS: Final = {"classical": "the classical washout"}
+"""What can be tuned; the start of a search is the preset of this name."""
+
+
+@dataclass(frozen=True)
+class TuneCommand:
+    """Search for the parameters with which an algorithm is at its best on random drives or named maneuvers.
+
+    No set that meets a limit of the machine counts as good. Writes a policy for `motion-cueing evaluate
+    --policy FILE`. Ctrl-C stops after the generation at hand; --resume goes on.
+    """
+
+    algorithm: Positional[Annotated[str, arg(metavar="|".join(_ALGORITHMS))]]
+    """What to tune."""
+    objective: Literal["J", "perceived"] = "J"
+    """What to minimise: J, or J of what the driver senses."""
+    method: Literal["cma", "gradient"] = "cma"
+    """Search with CMA-ES, or along the gradient of J through the machine's equations."""
+    maneuvers: Annotated[tuple[str, ...], arg(metavar="train|NAME|FILE ...")] = ("train",)
+    """Random drives, or maneuvers and recordings by name or cue CSV file."""
+    drives: int | None = None
+    """Random drives, each of a minute; default: 256."""
+    budget: float | None = None
+    """Hours to simulate; default: 1000."""
+    seed: int | None = None
+    """Of everything that the search draws; default: 0."""
+    start: Annotated[str | None, arg(metavar="NAME|FILE")] = None
+    """Washout to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it.
+    Default: classical."""
+    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
+    """Motion base, by name or YAML file."""
+    car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
+    """Car that drives named maneuvers, by name or YAML file."""
+    threads: int = 1
+    """Cores to use."""
+    out: Annotated[Path, arg(metavar="FILE.yaml")] = Path("classical-tuned.yaml")
+    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json."""
+    resume: Annotated[bool, FlagCreatePairsOff] = False
+    """Go on with the search kept beside --out; --budget may extend it."""
+
+
+def run(command: TuneCommand) -> int:
+    """Search, and write what was found.
+
+    Raises:
+        MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
+    """
+    _check(command)
+    record = _record(command)
+    search = _search(command, record)
+    interrupt = Interrupt()
+    with interrupt.caught(), TuningProgress(search.options.budget) as progress:
+        stopped = search.run(progress.tell, lambda: interrupt.asked)
+    _write(command, search)
+    status = search.status
+    if stopped:
+        on = f"motion-cueing tune {command.algorithm} --out {command.out} --resume"
+        print(f"stopped after {status.hours:.0f} h; go on with: {on}", file=sys.stderr)
+        return _INTERRUPTED
+    if status.hours < search.options.budget:
+        print(f"nothing better to be found after {status.hours:.0f} h", file=sys.stderr)
+    return _SUCCESS
+
+
+def _check(command: TuneCommand) -> None:
+    look_up("algorithm", command.algorithm, _ALGORITHMS)
+    if command.out.suffix not in (".yaml", ".yml"):
+        raise ConfigurationError(f"--out {command.out}: a policy's file ends in .yaml")
+    if command.threads < 1:
+        raise ConfigurationError(f"--threads must be at least 1, found {command.threads}")
+    kept = _kept(command)
+    if not command.resume and kept.exists():
+        raise ConfigurationError(f"{kept} holds a search; go on with --resume, or name another --out")
+    if command.resume:
+        _check_resumed(command)
+
+
+def _check_resumed(command: TuneCommand) -> None:
+    """A search that is taken up keeps its options."""
+    fresh = TuneCommand(command.algorithm)
+    for name in ("objective", "method", "maneuvers", "drives", "seed", "start", "platform", "car"):
+        if getattr(command, name) != getattr(fresh, name):
+            raise ConfigurationError(f"--{name} was chosen when the search was begun; leave it out")
+
+
+def _kept(command: TuneCommand) -> Path:
+    return command.out.with_suffix(".search.json")
+
+
+def _record(command: TuneCommand) -> Record:
+    """The record of an earlier session, or an empty one of a new search."""
+    from ..baselines.tuning.search import Record, load_record
+
+    if command.resume:
+        record = load_record(_kept(command))
+        budget = command.budget or record.options.budget
+        return replace(record, options=replace(record.options, budget=budget))
+    return Record(_options(command), command.platform, command.car, "")
+
+
+def _options(command: TuneCommand) -> TuningOptions:
+    from ..baselines.tuning.options import TuningOptions
+    from ..baselines.washout import load_washout
+
+    given = {name: getattr(command, name) for name in ("drives", "budget", "seed")}
+    return TuningOptions(
+        start=load_washout(command.start or command.algorithm),
+        objective=command.objective,
+        method=command.method,
+        maneuvers=command.maneuvers,
+        **{name: value for name, value in given.items() if value is not None},
+    )
+
+
+def _search(command: TuneCommand, record: Record) -> Search:
+    from ..baselines.tuning.objective import Objective
+    from ..baselines.tuning.search import Search
+
+    options = record.options
+    drives = _drives(options, find_car(record.car))
+    objective = Objective(drives, find_platform(record.platform), options.objective, command.threads)
+    search = Search(options, objective, (record.platform, record.car), _kept(command))
+    if command.resume:
+        search.resume(record)
+    return search
+
+
+def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
+    from ..baselines.tuning.options import TRAIN
+    from ..envs.car import random_drives
+
+    drives: list[CueTrace] = []
+    if TRAIN in options.maneuvers:
+        drives += random_drives(options.drives, options.duration, options.drives_seed)
+    named = [name for name in options.maneuvers if name != TRAIN]
+    for label, source in find_maneuvers(named, car).items():
+        try:
+            drives.append(source())
+        except ValueError as error:
+            raise DataError(f"maneuver {label}: {error}") from None
+    return drives
+
+
+def _write(command: TuneCommand, search: Search) -> None:
+    """The policy, with what is known about it on top."""
+    options = search.options
+    how = "CMA-ES" if options.method == "cma" else "gradient descent"
+    goal = "J" if options.objective == "J" else "perceived J"
+    name, drives = command.out.stem, len(search.objective.drives)
+    many = f"{drives} random drives" if options.maneuvers == ("train",) else ", ".join(options.maneuvers)
+    tuned = search.result(name, f"{options.start.name} at its best: tuned by {how} for {goal} on {many}")
+    notes = [
+        f"Made by: {command_line()}",
+        f"{now()}, commit {commit() or 'unknown'}, {hardware('cpu')}",
+        ", ".join(f"{package} {version}" for package, version in versions().items()),
+        f"{search.status.hours:.0f} h simulated in {search.status.steps} steps, seed {options.seed}",
+        *_scores(f"on the {many} of the search", search.objective, options.start, tuned),
+    ]
+    if "train" in options.maneuvers:
+        held_out = _held_out(search)
+        notes += _scores(f"on {len(held_out.drives)} random drives held out", held_out, options.start, tuned)
+    at_bounds = list(search.space.at_bounds(tuned))
+    notes.append(f"at a bound of the search: {', '.join(at_bounds) or 'nothing'}")
+    text = yaml.safe_dump(to_dict(tuned), sort_keys=False)
+    write_text(command.out, "".join(f"# {note}\n" for note in notes) + text)
+    print("\n".join([str(command.out), *(f"  {note}" for note in notes[3:])]))
+
+
+def _held_out(search: Search) -> Objective:
+    from ..baselines.tuning.objective import Objective
+    from ..baselines.tuning.options import HELD_OUT, HELD_OUT_SEED
+    from ..envs.car import random_drives
+
+    given = search.objective
+    drives = random_drives(HELD_OUT, search.options.duration, HELD_OUT_SEED)
+    return Objective(drives, given.platform, given.measure, given.threads)
+
+
+def _scores(
+    where: str, objective: Objective, start: WashoutParameters, tuned: WashoutParameters
+) -> list[str]:
+    found = objective.judge([start, tuned])
+    return [
+        f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "
+        f"{100.0 * found.at_limit[i]:.3f} % of the time at a limit"
+        for i, name in enumerate((start.name, tuned.name))
+    ]
