@@ -81,39 +81,35 @@ class Actor(nn.Module):
 
     def network(self) -> Network:
         """The same in NumPy."""
-        return network_of_layers(self.latent, self.head)
-
-
-def network_of_layers(latent: Latent, head: nn.Linear) -> Network:
-    """Hidden layers and last layer as a network."""
-    linear = [layer for layer in latent.hidden if isinstance(layer, nn.Linear)] + [head]
-    return Network(
-        weights=tuple(_numpy(layer.weight) for layer in linear),
-        biases=tuple(_numpy(layer.bias) for layer in linear),
-        activation=latent.activation,  # type: ignore[arg-type]
-        squash="tanh",
-        skip=True,
-    )
-
-
-def load_layers(network: Network, latent: Latent, head: nn.Linear) -> None:
-    """Give hidden layers and last layer the weights of a network.
-
-    Raises:
-        DataError: the network is built in another way.
-    """
-    linear = [layer for layer in latent.hidden if isinstance(layer, nn.Linear)] + [head]
-    same = network.skip and network.squash == "tanh" and network.mean is None
-    shapes = [tuple(layer.weight.shape) for layer in linear]
-    if not same or network.activation != latent.activation or shapes != [w.shape for w in network.weights]:
-        raise DataError(
-            "initial: the agent's network is built in another way; use its hidden layers and activation, "
-            f"which are {[w.shape[0] for w in network.weights[:-1]]} and {network.activation}"
+        return Network(
+            weights=tuple(_numpy(layer.weight) for layer in self._linear),
+            biases=tuple(_numpy(layer.bias) for layer in self._linear),
+            activation=self.latent.activation,  # type: ignore[arg-type]
+            squash="tanh",
+            skip=True,
         )
-    with torch.no_grad():
-        for layer, weight, bias in zip(linear, network.weights, network.biases, strict=True):
-            layer.weight.copy_(torch.from_numpy(weight.copy()))
-            layer.bias.copy_(torch.from_numpy(bias.copy()))
+
+    def load(self, network: Network) -> None:
+        """Take over the weights of a network.
+
+        Raises:
+            DataError: the network is built in another way.
+        """
+        same = network.skip and network.squash == "tanh" and network.mean is None
+        same = same and network.activation == self.latent.activation
+        if not same or [w.shape for w in network.weights] != [tuple(x.weight.shape) for x in self._linear]:
+            raise DataError(
+                "initial: the agent's network is built in another way; use its hidden layers and activation, "
+                f"which are {[w.shape[0] for w in network.weights[:-1]]} and {network.activation}"
+            )
+        with torch.no_grad():
+            for layer, weight, bias in zip(self._linear, network.weights, network.biases, strict=True):
+                layer.weight.copy_(torch.from_numpy(weight.copy()))
+                layer.bias.copy_(torch.from_numpy(bias.copy()))
+
+    @property
+    def _linear(self) -> list[nn.Linear]:
+        return [layer for layer in self.latent.hidden if isinstance(layer, nn.Linear)] + [self.head]
 
 
 def begin_at_rest(actor: Actor, batch: Batch) -> None:

@@ -17,6 +17,7 @@ from torch import nn
 from ..envs.errors import DataError
 from .actor import ACTIVATIONS
 from .agent import Network
+from .sb3_policy import SkipPolicy
 
 _NAMES = {module: name for name, module in ACTIVATIONS.items()}
 
@@ -31,7 +32,7 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
     Raises:
         DataError: the policy is not a chain of linear layers with one kind of activation.
     """
-    layers, squash = _actor(model)
+    layers, squash, skip = _actor(model)
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     mean, variance, clip = None, None, 10.0
     if normalize is not None and normalize.norm_obs:
@@ -42,6 +43,7 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         biases=tuple(_numpy(layer.bias) for layer in linear),
         activation=_activation(layers),  # type: ignore[arg-type]
         squash="tanh" if squash else "clip",
+        skip=skip,
         mean=mean,
         variance=variance,
         clip=clip,
@@ -62,9 +64,9 @@ def load_network(
     Raises:
         DataError: the network is built in another way.
     """
-    layers, squash = _actor(model)
+    layers, squash, skip = _actor(model)
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-    ours = ([tuple(layer.weight.shape) for layer in linear], _activation(layers), squash, False)
+    ours = ([tuple(layer.weight.shape) for layer in linear], _activation(layers), squash, skip)
     theirs = [w.shape for w in network.weights], network.activation, network.squash == "tanh", network.skip
     if ours != theirs:
         raise DataError(
@@ -94,17 +96,19 @@ def _load_statistics(network: Network, normalize: VecNormalize | None, weight: f
         statistics.count = weight
 
 
-def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool]:
-    """Layers from the observation to the action, and whether a tanh follows them."""
+def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
+    """Layers from the observation to the action; whether a tanh follows, and whether the last sees both."""
     policy: Any = model.policy
     actor = policy if isinstance(model, OnPolicyAlgorithm) else policy.actor
     if not isinstance(actor.features_extractor, FlattenExtractor):
         raise DataError("the policy's features extractor is not the plain one; it cannot become a network")
+    if isinstance(policy, SkipPolicy):
+        return [*policy.hidden, policy.action_net], True, True
     if isinstance(model, OnPolicyAlgorithm):
-        return [*policy.mlp_extractor.policy_net, policy.action_net], bool(policy.squash_output)
+        return [*policy.mlp_extractor.policy_net, policy.action_net], bool(policy.squash_output), False
     if hasattr(actor, "latent_pi"):
-        return [*_flat(actor.latent_pi), *_flat(actor.mu)], True
-    return _flat(actor.mu)[:-1], True
+        return [*_flat(actor.latent_pi), *_flat(actor.mu)], True, False
+    return _flat(actor.mu)[:-1], True, False
 
 
 def _flat(module: nn.Module) -> list[nn.Module]:

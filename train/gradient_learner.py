@@ -20,7 +20,7 @@ from ..envs.task.batch import Batch
 from ..envs.task.options import PositiveCount
 from ..envs.task.reward_kernel import TERMS
 from ..envs.task.unroll import TaskUnroll
-from .actor import ACTIVATIONS, Actor, begin_at_rest, load_layers
+from .actor import ACTIVATIONS, Actor, begin_at_rest
 from .agent import Network
 from .config import TrainingConfig
 from .initial import initial_network
@@ -99,7 +99,7 @@ class GradientLearner:
         if network is None:
             begin_at_rest(self.actor, self.batch)
         else:
-            load_layers(network, self.actor.latent, self.actor.head)
+            self.actor.load(network)
 
     @property
     def steps(self) -> int:

@@ -9,11 +9,13 @@ from typing import Any, Final, get_type_hints
 
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
+from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
 
 from ..envs.errors import ConfigurationError, suggest
 from .actor import ACTIVATIONS
+from .sb3_policy import SkipPolicy
 
 SCHEDULED: Final = "lin_"
 """Before a number: it falls linearly to zero at the end of the training."""
@@ -25,6 +27,7 @@ NOISES: Final[Mapping[str, Any]] = {
 """Names that ``noise_type`` takes."""
 
 _NOISE: Final = ("noise_type", "noise_std")
+_POLICY: Final = "policy"
 _OURS: Final = {
     "self", "policy", "env", "verbose", "seed", "device", "tensorboard_log", "stats_window_size",
     "action_noise", "rollout_buffer_class", "rollout_buffer_kwargs", "replay_buffer_class",
@@ -47,7 +50,8 @@ def arguments(
     Args:
         algorithm: Its class.
         hyperparameters: As in rl-baselines3-zoo: numbers may be schedules (``lin_3e-4``); ``policy_kwargs``
-            is a mapping, its ``activation_fn`` one of :data:`ACTIVATIONS`; ``noise_type`` and ``noise_std``
+            is a mapping, its ``activation_fn`` one of :data:`ACTIVATIONS`; ``policy`` "MlpPolicy" or, for
+            PPO, "SkipPolicy", whose last layers see the observation, too; ``noise_type`` and ``noise_std``
             make the action noise.
         action_size: Entries of an action.
 
@@ -56,13 +60,21 @@ def arguments(
     """
     known = _parameters(algorithm, _OURS)
     noisy = "action_noise" in inspect.signature(algorithm).parameters
-    _refuse_unknown("hyperparameters", hyperparameters, [*known, *(_NOISE if noisy else ())])
-    found = {name: value for name, value in hyperparameters.items() if name not in _NOISE}
+    _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *(_NOISE if noisy else ())])
+    found = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
     found["policy_kwargs"] = _policy_kwargs(algorithm, found.get("policy_kwargs") or {})
     checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in found.items()}
+    checked[_POLICY] = _policy(algorithm, hyperparameters.get(_POLICY, "MlpPolicy"))
     if "noise_type" in hyperparameters or "noise_std" in hyperparameters:
         checked["action_noise"] = _noise(hyperparameters, action_size)
     return checked
+
+
+def _policy(algorithm: type[BaseAlgorithm], name: Any) -> Any:
+    known = {"MlpPolicy": "MlpPolicy"} | ({"SkipPolicy": SkipPolicy} if algorithm is PPO else {})
+    if name not in known:
+        raise ConfigurationError(f"hyperparameters.policy: {name!r}; use one of {', '.join(known)}")
+    return known[name]
 
 
 def _parameters(cls: type[Any], ours: set[str]) -> dict[str, Any]:

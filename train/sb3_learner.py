@@ -121,7 +121,7 @@ def _model(
     algorithm: type[BaseAlgorithm], env: VecEnv, config: TrainingConfig, hyperparameters: dict[str, Any]
 ) -> BaseAlgorithm:
     try:
-        return algorithm("MlpPolicy", env, seed=config.seed, device=config.device, **hyperparameters)
+        return algorithm(env=env, seed=config.seed, device=config.device, **hyperparameters)
     except (AssertionError, TypeError, ValueError) as error:
         # Values that are right by themselves, but do not go together.
         raise ConfigurationError(f"hyperparameters: {' '.join(str(error).split())}") from None

@@ -15,6 +15,7 @@ from motion_cueing.envs.task import ObservationOptions
 from motion_cueing.envs.task.layout import layout_of
 from motion_cueing.train.from_sb3 import load_network, network_of
 from motion_cueing.train.sb3_learner import CLASSES
+from motion_cueing.train.sb3_policy import SkipPolicy
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 from ..env.tasks import SHORT
@@ -67,6 +68,27 @@ def test_activations_are_the_models(name, activation):
     seen = observations(SIZE)
     expected, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
     assert np.allclose(network_of(model, normalize)(seen), expected, rtol=0.0, atol=1e-5)
+
+
+def test_a_policy_whose_last_layer_sees_the_observation_goes_to_a_network_and_back():
+    models = []
+    for seed in (1, 2):
+        env = DrivingSimulatorVecEnv(2, episode=SHORT)
+        models.append(PPO(SkipPolicy, env, policy_kwargs={"net_arch": [16, 12]}, seed=seed))
+        shaken(models[-1])
+    network = network_of(models[0])
+    seen = observations(SIZE)
+    expected, _ = models[0].predict(seen, deterministic=True)
+    assert network.skip
+    assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
+    assert not np.allclose(models[1].predict(seen, deterministic=True)[0], expected, atol=0.01)
+    load_network(network, models[1], None, 1.0)
+    assert np.array_equal(models[1].predict(seen, deterministic=True)[0], expected)
+    # What is sampled scatters around the same mean, and the probability is that of what was sampled.
+    with torch.no_grad():
+        action, _, log_probability = models[1].policy(torch.from_numpy(seen))
+        _, again, _ = models[1].policy.evaluate_actions(torch.from_numpy(seen), action)
+    assert np.allclose(log_probability, again, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", CLASSES)
