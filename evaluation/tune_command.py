@@ -147,8 +147,8 @@ def _search(command: TuneCommand, record: Record) -> Search:
     from ..baselines.tuning.search import Search
 
     options = record.options
-    drives = _drives(options, find_car(record.car))
-    objective = Objective(drives, find_platform(record.platform), options.objective, command.threads)
+    car, platform = find_car(record.car), find_platform(record.platform)
+    objective = Objective(_drives(options, car), platform, options.objective, command.threads)
     search = Search(options, objective, (record.platform, record.car), _kept(command))
     if command.resume:
         search.resume(record)
@@ -159,11 +159,11 @@ def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
     from ..baselines.tuning.options import TRAIN
     from ..envs.car import random_drives
 
+    named = find_maneuvers([name for name in options.maneuvers if name != TRAIN], car)
     drives: list[CueTrace] = []
     if TRAIN in options.maneuvers:
         drives += random_drives(options.drives, options.duration, options.drives_seed)
-    named = [name for name in options.maneuvers if name != TRAIN]
-    for label, source in find_maneuvers(named, car).items():
+    for label, source in named.items():
         try:
             drives.append(source())
         except ValueError as error:

@@ -62,6 +62,11 @@ class Descent:
         return self._best
 
     @property
+    def tried(self) -> bool:
+        """Whether the last step was a trial."""
+        return self._count % (TRY_EVERY + 1) == 1
+
+    @property
     def converged(self) -> bool:
         """Whether the steps have become too small to matter."""
         return self._step < SMALLEST_STEP

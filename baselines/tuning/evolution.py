@@ -64,9 +64,14 @@ class Evolution:
         return self._best
 
     @property
+    def tried(self) -> bool:
+        """Whether the last step was a trial."""
+        return self._count % (TRY_EVERY + 1) == 1
+
+    @property
     def converged(self) -> bool:
-        """Whether one of the strategy's own criteria says so, and what it came to was tried."""
-        return bool(self._strategy.stop()) and self._count % (TRY_EVERY + 1) == 1
+        """Whether one of the strategy's own criteria says so."""
+        return bool(self._strategy.stop())
 
     @property
     def _tries(self) -> bool:

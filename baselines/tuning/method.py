@@ -36,6 +36,11 @@ class Method(Protocol):
         ...
 
     @property
+    def tried(self) -> bool:
+        """Whether what was found last has been tried on all drives."""
+        ...
+
+    @property
     def converged(self) -> bool:
         """Whether more steps would find nothing."""
         ...

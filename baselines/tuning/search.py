@@ -100,9 +100,13 @@ class Search:
     def run(
         self, tell: Callable[[Status], None] = lambda status: None, stop: Callable[[], bool] = lambda: False
     ) -> bool:
-        """Search until the budget is spent or nothing more is found; returns whether ``stop`` ended it."""
+        """Search until the budget is spent or nothing more is found, and what was found last is tried.
+
+        Returns:
+            Whether ``stop`` ended it.
+        """
         tell(self.status)
-        while self.status.hours < self.options.budget and not self._method.converged:
+        while not (self._at_its_end and self._method.tried):
             if stop():
                 return True
             self._take(self._method.measure(self.space, self.objective))
@@ -122,9 +126,8 @@ class Search:
         return Status(hours, None if best is None else best[0], len(self.found))
 
     @property
-    def converged(self) -> bool:
-        """Whether it ended, or would end, before its budget."""
-        return self._method.converged
+    def _at_its_end(self) -> bool:
+        return self.status.hours >= self.options.budget or self._method.converged
 
     def result(self, name: str, description: str) -> WashoutParameters:
         """The best set found, or the start before the first step."""

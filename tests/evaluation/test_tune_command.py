@@ -1,0 +1,139 @@
+"""``motion-cueing tune``: from the command line to a policy's file and on with it."""
+
+from __future__ import annotations
+
+import io
+import re
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from motion_cueing.baselines import make_policy
+from motion_cueing.baselines.tuning.search import Status, load_record
+from motion_cueing.baselines.washout import load_washout
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.evaluation import tune_command
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.tune_progress import TuningProgress
+from motion_cueing.train.interrupt import Interrupt
+
+from ..baselines.drives import trace
+
+HOUR = 3600.0
+
+
+@pytest.fixture
+def words(tmp_path, monkeypatch) -> list[str]:
+    """A search on one drive of two seconds, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    trace(2.0, lambda t: np.column_stack([np.sin(3.0 * t), 0.0 * t])).to_csv("weave.csv")
+    return ["tune", "classical", "--maneuvers", "weave.csv", "--out", "mine.yaml"]
+
+
+def test_what_it_writes_is_a_policy_and_says_how_it_was_made(words, tmp_path, capsys):
+    assert main([*words, "--budget", str(14 * 6 * 2.0 / HOUR)]) == 0
+    told = capsys.readouterr()
+    assert "best" in told.err
+    text = (tmp_path / "mine.yaml").read_text()
+    assert "# Made by: " in text
+    for line in told.out.splitlines()[1:]:
+        assert f"# {line.strip()}\n" in text
+    start, tuned = (float(found) for found in re.findall(r"J ([\d.]+), perceived", text))
+    assert 0.0 < tuned < start
+    policy = make_policy(tmp_path / "mine.yaml", get_platform("paper"))
+    assert policy.name == "mine"
+    assert load_washout(tmp_path / "mine.yaml").description == (
+        "classical at its best: tuned by CMA-ES for J on weave.csv"
+    )
+
+
+def test_random_drives_are_the_default_and_others_are_held_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tune", "classical", "--drives", "1", "--budget", "0.001", "--objective", "perceived"]) == 0
+    told = capsys.readouterr().out
+    assert "on the 1 random drives of the search: classical J" in told
+    assert "on 64 random drives held out: classical-tuned J" in told
+    record = load_record(tmp_path / "classical-tuned.search.json")
+    assert (record.options.maneuvers, record.options.objective) == (("train",), "perceived")
+
+
+def test_ctrl_c_keeps_the_search_and_resume_ends_where_it_would_have(words, tmp_path, monkeypatch, capsys):
+    words += ["--budget", str(14 * 5 * 2.0 / HOUR)]
+    assert main(words) == 0
+    whole = load_record(tmp_path / "mine.search.json")
+    (tmp_path / "mine.search.json").unlink()
+
+    with monkeypatch.context() as pressed:
+        pressed.setattr(tune_command, "Interrupt", PressedLater)
+        assert main(words) == 130
+    assert "go on with: motion-cueing tune classical --out mine.yaml --resume" in capsys.readouterr().err
+    assert len(load_record(tmp_path / "mine.search.json").found) == 3
+    assert main(["tune", "classical", "--out", "mine.yaml", "--resume"]) == 0
+    assert load_record(tmp_path / "mine.search.json") == whole
+    # A larger budget goes on from the end.
+    longer = str(2.0 * whole.options.budget)
+    assert main(["tune", "classical", "--out", "mine.yaml", "--resume", "--budget", longer]) == 0
+    further = load_record(tmp_path / "mine.search.json")
+    assert further.found[: len(whole.found)] == whole.found
+    assert len(further.found) > len(whole.found)
+
+
+class PressedLater(Interrupt):
+    """Ctrl-C during the third step."""
+
+    def __init__(self) -> None:
+        self._questions = 0
+
+    @property
+    def asked(self) -> bool:
+        self._questions += 1
+        return self._questions > 3
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--out", "mine.txt"], "a policy's file ends in .yaml"),
+        (["--threads", "0"], "--threads must be at least 1, found 0"),
+        (["--budget", "-1"], "field 'budget': Input should be greater than 0"),
+        (["--drives", "0"], "field 'drives'"),
+        (["--maneuvers", "brakin"], "unknown maneuver 'brakin'. Did you mean braking?"),
+        (["--start", "clasical"], "Did you mean classical"),
+        (["--platform", "paperr"], "Did you mean paper"),
+        (["--method", "gradient", "--objective", "perceived"], "no gradient"),
+        (["--resume"], "no search can be read"),
+        (["--resume", "--seed", "3"], "--seed was chosen when the search was begun"),
+        (["--objective", "K"], "K"),
+    ],
+)
+def test_wrong_arguments_are_named(more, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tune", "classical", *more]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_algorithms_and_searches_that_are_there_already_are_refused(words, tmp_path, capsys):
+    assert main(["tune", "optimal"]) == 2
+    assert "unknown algorithm 'optimal'" in capsys.readouterr().err
+    (tmp_path / "mine.search.json").write_text("{}")
+    assert main(words) == 2
+    assert "go on with --resume, or name another --out" in capsys.readouterr().err
+
+
+def test_progress_is_a_bar_on_a_terminal_and_some_lines_elsewhere():
+    shown = {}
+    for terminal in (True, False):
+        text = io.StringIO()
+        with TuningProgress(10.0, Console(file=text, force_terminal=terminal, width=100)) as progress:
+            for step in range(101):
+                progress.tell(Status(0.1 * step, 3.0 - 0.01 * step if step else None, step))
+        shown[terminal] = text.getvalue()
+    assert "best" in shown[True]
+    assert "10/10 h" in shown[True]
+    lines = shown[False].splitlines()
+    assert 10 < len(lines) <= 21
+    assert lines[-1].split() == ["10", "h", "best", "2.0000", "(100", "steps)"]
