@@ -1,0 +1,49 @@
+"""Curves of trainings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.curves_command import grouped, read_curve
+
+
+@pytest.fixture
+def runs(tmp_path):
+    for name, end in (("fast-0", 1.0), ("fast-1", 3.0), ("slow", 5.0)):
+        (tmp_path / name).mkdir()
+        text = f"steps,classical/J,validation/J\n0,2.3,8\n500000,,6\n1000000,,{end}\n"
+        (tmp_path / name / "log.csv").write_text(text, encoding="utf-8")
+    return [tmp_path / name for name in ("fast-0", "fast-1", "slow")]
+
+
+def test_seeds_of_a_training_are_one_line_with_a_band(runs, tmp_path, capsys):
+    out = tmp_path / "curves.svg"
+    assert main(["curves", *map(str, runs), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "fast: lowest validation/J 2 (1 to 3)" in told
+    assert "slow: lowest validation/J 5 (5 to 5)" in told
+    assert out.read_text(encoding="utf-8").lstrip().startswith("<?xml")
+
+
+def test_a_curve_holds_the_rows_that_have_the_scalar(runs):
+    np.testing.assert_array_equal(read_curve(runs[0], "classical/J"), [[0.0], [2.3]])
+    curve = read_curve(runs[0], "validation/J")
+    np.testing.assert_array_equal(curve, [[0.0, 5e5, 1e6], [8.0, 6.0, 1.0]])
+    assert [len(seeds) for seeds in grouped(dict.fromkeys(runs, curve)).values()] == [2, 1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--out", "x.png"], "name at least one folder"),
+        (["RUN", "--out", "x.pdf"], "ends in .png or .svg"),
+        (["RUN", "--out", "x.png", "--scalar", "validation/j"], "validation/J"),
+        (["nowhere", "--out", "x.png"], "no log of a training"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(runs, arguments, told, capsys):
+    given = [str(runs[0]) if argument == "RUN" else argument for argument in arguments]
+    assert main(["curves", *given]) == 2
+    assert told in capsys.readouterr().err
