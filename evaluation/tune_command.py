@@ -125,7 +125,7 @@ def _record(command: TuneCommand) -> Record:
         record = load_record(_kept(command))
         budget = command.budget or record.options.budget
         return replace(record, options=replace(record.options, budget=budget))
-    return Record(_options(command), command.platform, command.car, "")
+    return Record(_options(command), command.platform, command.car, "", command=command_line())
 
 
 def _options(command: TuneCommand) -> TuningOptions:
@@ -149,7 +149,8 @@ def _search(command: TuneCommand, record: Record) -> Search:
     options = record.options
     car, platform = find_car(record.car), find_platform(record.platform)
     objective = Objective(_drives(options, car), platform, options.objective, command.threads)
-    search = Search(options, objective, (record.platform, record.car), _kept(command))
+    names = record.platform, record.car
+    search = Search(options, objective, names, _kept(command), record.command)
     if command.resume:
         search.resume(record)
     return search
@@ -180,7 +181,7 @@ def _write(command: TuneCommand, search: Search) -> None:
     many = f"{drives} random drives" if options.maneuvers == ("train",) else ", ".join(options.maneuvers)
     tuned = search.result(name, f"{options.start.name} at its best: tuned by {how} for {goal} on {many}")
     notes = [
-        f"Made by: {command_line()}",
+        f"Made by: {search.command}" + (", stopped and resumed" if command.resume else ""),
         f"{now()}, commit {commit() or 'unknown'}, {hardware('cpu')}",
         ", ".join(f"{package} {version}" for package, version in versions().items()),
         f"{search.status.hours:.0f} h simulated in {search.status.steps} steps, seed {options.seed}",

@@ -36,6 +36,7 @@ class Record:
         car: Name or file of the car.
         inputs: Checksum of drives and machine.
         found: What its steps found.
+        command: That began it, for people.
     """
 
     options: TuningOptions
@@ -43,6 +44,7 @@ class Record:
     car: str
     inputs: str
     found: tuple[Found, ...] = ()
+    command: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Search:
         objective: What it minimises; its drives are those of the options.
         names: Of platform and car, as the file holds them.
         path: File that is written after every step; None for none.
+        command: That begins it, for people.
     """
 
     def __init__(
@@ -76,8 +79,9 @@ class Search:
         objective: Objective,
         names: tuple[str, str] = ("paper", "sedan"),
         path: Path | None = None,
+        command: str = "",
     ) -> None:
-        self.options, self.objective, self.path = options, objective, path
+        self.options, self.objective, self.path, self.command = options, objective, path, command
         self.space = WashoutSpace(options.start)
         self.found: list[Found] = []
         self._names, self._inputs = names, checksum(objective)
@@ -138,7 +142,7 @@ class Search:
     def save(self) -> None:
         """Write the file, whole or not at all."""
         if self.path is not None:
-            record = Record(self.options, *self._names, self._inputs, tuple(self.found))
+            record = Record(self.options, *self._names, self._inputs, tuple(self.found), self.command)
             write_text(self.path, json.dumps(to_dict(record)) + "\n")
 
 

@@ -58,16 +58,17 @@ _RATE_LIMITS: Final = (math.radians(3.0), 1.5)
 """From the perception of a rate to what no road asks for, rad/s."""
 _DAMPING: Final = (0.4, 2.0)
 """From a quarter of overshoot to two real poles a factor of 14 apart."""
-_ROTATION: Final = (0.001, 3.0)
-"""rad/s; the turntable has no end, so yaw need not return within a drive."""
-_TRANSLATION: Final = (0.03, 5.0)
-"""rad/s; slower than that, the machine is not back for what comes half a minute later."""
+_ROTATION: Final = (0.001, 2.5)
+"""rad/s; up to the set of shoarai/washout. The turntable has no end: yaw need not return within a drive."""
+_TRANSLATION: Final = (0.03, 2.5)
+"""rad/s; up to Reid and Nahon's sets. Below, the machine is not back for what comes half a minute later."""
 _HEAVE: Final = (0.1, 10.0)
 _ROLL_OFF: Final = (10.0, 200.0)
-_TILT: Final = (0.1, 20.0)
+_TILT: Final = (0.1, 5.0)
+"""rad/s; up to Reid and Nahon's sets. Above, tilt takes over the onset, and the road's roughness with it."""
 _TILT_RATE: Final = (math.radians(0.5), math.radians(5.0))
-"""Up to the largest limit in use: 5 deg/s, "doi 10.1177/0037549716675955"."""
-_TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(60.0))
+"""Up to the largest limit in use, with the acceleration below: doi 10.1177/0037549716675955."""
+_TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(8.0))
 _APPROACH: Final = (0.5, 50.0)
 _SPLIT: Final = (0.3, 60.0)
 
