@@ -1,0 +1,208 @@
+"""PPO in one file, in the style of CleanRL: a plain loop over the native batch, with PyTorch alone.
+
+Run it with ``python examples/cleanrl_style_ppo.py --steps 200000``; ``--help`` shows every argument. The
+loop is that of CleanRL's ``ppo_continuous_action.py`` (Huang et al. 2022, JMLR 23:274), with one
+difference: an episode that is cut off has a future, so the value of the state it was cut off in counts. A
+batch that begins anew in the same step tells that state as ``final_obs``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+import tyro
+from torch import nn
+
+import motion_cueing.envs
+from motion_cueing.baselines import ClassicalWashout
+from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.task import ActionOptions, EpisodeOptions, ObservationOptions, TaskOptions
+from motion_cueing.evaluation import measure, rollout
+from motion_cueing.train.agent import Agent, Network, Record
+
+TASK = TaskOptions(
+    observation=ObservationOptions(preview=10, preview_spacing=0.1, frame="cab"),
+    action=ActionOptions(mode="residual", authority=0.1, repeat=5, frame="cab"),
+    episode=EpisodeOptions(duration=15.0, random_start=True),
+)
+
+
+@dataclass
+class Args:
+    """PPO on random drives, a residual on the washout."""
+
+    steps: int = 200_000
+    """Actions in all."""
+    num_envs: int = 64
+    """Environments in the batch."""
+    num_steps: int = 128
+    """Actions in each environment between two updates."""
+    epochs: int = 10
+    """Passes over what was played."""
+    minibatch: int = 2048
+    """Actions in a gradient."""
+    learning_rate: float = 1e-3
+    """At the beginning; it falls to zero."""
+    gamma: float = 0.97
+    """Discount."""
+    gae_lambda: float = 0.95
+    """Of the generalised advantage estimation."""
+    clip: float = 0.2
+    """Largest change of a probability ratio that pays."""
+    reward_scale: float = 0.02
+    """Brings returns to the order of one."""
+    seed: int = 0
+    """Of weights, noise and drives."""
+    maneuver: str = "lane-change"
+    """What the agent is held against the washout on."""
+
+
+class ActorCritic(nn.Module):
+    """Two small networks and a standard deviation; the actor begins as the washout alone."""
+
+    def __init__(self, size: int, action_size: int) -> None:
+        super().__init__()
+        self.actor = nn.Sequential(nn.Linear(size, 64), nn.Tanh(), nn.Linear(64, action_size))
+        self.critic = nn.Sequential(
+            nn.Linear(size, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, 1)
+        )
+        self.log_std = nn.Parameter(torch.full((action_size,), -1.5))
+        nn.init.zeros_(self.actor[-1].weight)
+        nn.init.zeros_(self.actor[-1].bias)
+
+    def value(self, observation: torch.Tensor) -> torch.Tensor:
+        """(n,) expected returns."""
+        return self.critic(observation).squeeze(-1)
+
+    def distribution(self, observation: torch.Tensor) -> torch.distributions.Normal:
+        """Of the actions (n, k), each entry by itself."""
+        return torch.distributions.Normal(self.actor(observation), self.log_std.exp())
+
+
+@dataclass
+class Rollout:
+    """What was played: (steps, environments, ...) each."""
+
+    observation: torch.Tensor
+    action: torch.Tensor
+    log_prob: torch.Tensor
+    reward: torch.Tensor
+    future: torch.Tensor  # discounted value after the step, where an episode was cut off
+    ended: torch.Tensor
+    value: torch.Tensor
+
+
+def play(
+    envs: Any, agent: ActorCritic, observation: torch.Tensor, args: Args
+) -> tuple[Rollout, torch.Tensor]:
+    """The next rollout, and the observation after it."""
+    rows: list[tuple[torch.Tensor, ...]] = []
+    for _ in range(args.num_steps):
+        with torch.no_grad():
+            distribution, value = agent.distribution(observation), agent.value(observation)
+            action = distribution.sample()
+            log_prob = distribution.log_prob(action).sum(-1)
+        # The environment clips actions to its box, and so the policy needs no squashing.
+        following, reward, terminated, truncated, info = envs.step(action.numpy())
+        future = torch.zeros(len(reward))
+        cut = truncated & ~terminated
+        if cut.any():
+            last = torch.as_tensor(np.stack(info["final_obs"][cut]))
+            with torch.no_grad():
+                future[torch.as_tensor(cut)] = args.gamma * agent.value(last)
+        gained = args.reward_scale * torch.as_tensor(reward, dtype=torch.float32)
+        ended = torch.as_tensor(terminated | truncated)
+        rows.append((observation, action, log_prob, gained, future, ended, value))
+        observation = torch.as_tensor(following)
+    return Rollout(*(torch.stack(column) for column in zip(*rows, strict=True))), observation
+
+
+def advantages(played: Rollout, value_after: torch.Tensor, args: Args) -> torch.Tensor:
+    """(steps, environments) by generalised advantage estimation; nothing flows back over an episode's end."""
+    found, carried, following = torch.zeros_like(played.reward), torch.zeros_like(value_after), value_after
+    for k in reversed(range(len(found))):
+        goes_on = 1.0 - played.ended[k].float()
+        ahead = played.future[k] + args.gamma * goes_on * following
+        error = played.reward[k] + ahead - played.value[k]
+        carried = error + args.gamma * args.gae_lambda * goes_on * carried
+        found[k], following = carried, played.value[k]
+    return found
+
+
+def loss(
+    agent: ActorCritic, batch: Rollout, advantage: torch.Tensor, goal: torch.Tensor, args: Args
+) -> torch.Tensor:
+    """PPO's clipped objective, and the critic's error."""
+    ratio = (agent.distribution(batch.observation).log_prob(batch.action).sum(-1) - batch.log_prob).exp()
+    advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+    clipped = ratio.clamp(1.0 - args.clip, 1.0 + args.clip)
+    policy = -torch.min(ratio * advantage, clipped * advantage).mean()
+    return policy + 0.5 * (agent.value(batch.observation) - goal).square().mean()
+
+
+def update(
+    agent: ActorCritic, optimizer: torch.optim.Optimizer, played: Rollout, advantage: torch.Tensor, args: Args
+) -> None:
+    """Some epochs of minibatches over a rollout."""
+    flat = Rollout(*(column.flatten(0, 1) for column in vars(played).values()))
+    goal, advantage = (advantage + played.value).flatten(), advantage.flatten()
+    for _ in range(args.epochs):
+        for rows in torch.randperm(len(goal)).split(args.minibatch):
+            batch = Rollout(*(column[rows] for column in vars(flat).values()))
+            optimizer.zero_grad()
+            loss(agent, batch, advantage[rows], goal[rows], args).backward()
+            nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
+            optimizer.step()
+
+
+def train(args: Args) -> Agent:
+    """Play and update, until the actions are used up."""
+    torch.set_num_threads(1)
+    torch.manual_seed(args.seed)
+    envs = gymnasium.make_vec(
+        motion_cueing.envs.ENVIRONMENT_ID,
+        num_envs=args.num_envs,
+        task=TASK,
+        base=ClassicalWashout(),
+        autoreset_mode="SameStep",
+    )
+    (size,), (action_size,) = envs.single_observation_space.shape, envs.single_action_space.shape
+    agent = ActorCritic(size, action_size)
+    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+    observation = torch.as_tensor(envs.reset(seed=args.seed)[0])
+    updates = max(1, args.steps // (args.num_envs * args.num_steps))
+    for k in range(updates):
+        optimizer.param_groups[0]["lr"] = args.learning_rate * (1.0 - k / updates)
+        played, observation = play(envs, agent, observation, args)
+        with torch.no_grad():
+            after = agent.value(observation)
+        update(agent, optimizer, played, advantages(played, after, args), args)
+        print(f"update {k + 1} of {updates}: mean reward {played.reward.mean() / args.reward_scale:.2f}")
+    return exported(agent, updates * args.num_envs * args.num_steps, args.seed)
+
+
+def exported(agent: ActorCritic, steps: int, seed: int) -> Agent:
+    """The actor as an agent that needs no PyTorch."""
+    layers = [layer for layer in agent.actor if isinstance(layer, nn.Linear)]
+    network = Network(
+        weights=tuple(layer.weight.detach().numpy() for layer in layers),
+        biases=tuple(layer.bias.detach().numpy() for layer in layers),
+    )
+    return Agent("cleanrl-style", TASK, network, Record(algo="ppo", seed=seed, steps=steps), base="classical")
+
+
+def main(args: Args) -> None:
+    """Train, save, and print J of the agent and of the washout: 0 is perfect."""
+    agent = train(args)
+    agent.save("cleanrl-style.safetensors")
+    cues = get_maneuver(args.maneuver).drive()
+    for policy in (ClassicalWashout(), agent):
+        print(f"{policy.name:<20} J = {measure(rollout(policy, cues)).cue_error:6.3f}")
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Args))
