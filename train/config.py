@@ -24,6 +24,8 @@ EVALUATION_ONLY: Final = (
     "leave it empty for random drives"
 )
 
+_RECIPES: Final = Path(__file__).parent / "recipes"
+
 
 @configuration
 class NormalizeOptions:
@@ -171,7 +173,7 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
 
     Args:
         algo: The algorithm; None for the one that the file names.
-        path: YAML file with any of the fields; mappings are merged (but for ``search``), all else replaces.
+        path: YAML file with any of the fields, or the name of one of :func:`recipe_names`; mappings are merged (but for ``search``), all else replaces.
         **fields: Fields of :class:`TrainingConfig` that go before the file; None leaves one as it is.
 
     Raises:
@@ -179,7 +181,7 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
         DataError: the file cannot be read or is not YAML.
         ConfigurationError: a field is unknown, missing or out of range.
     """
-    given = {} if path is None else _fields(path)
+    given = {} if path is None else _fields(_recipe(path))
     named = given.get("algo")
     if algo is not None and named not in (None, algo):
         raise ConfigurationError(f"{path}: it is for algo {named}, but --algo is {algo}; leave one out")
@@ -197,6 +199,16 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
         # The file may not be there any more when the training is resumed.
         config = replace(config, base=load_washout(config.base))
     return config
+
+
+def recipe_names() -> list[str]:
+    """Names of the configurations that made the shipped agents."""
+    return sorted(path.stem for path in _RECIPES.glob("*.yaml"))
+
+
+def _recipe(path: Path) -> Path:
+    """The file of a recipe, or the path itself."""
+    return _RECIPES / f"{path}.yaml" if str(path) in recipe_names() else path
 
 
 def _fields(path: Path) -> dict[str, Any]:

@@ -32,8 +32,10 @@ class TrainCommand:
 
     algo: Annotated[str | None, arg(metavar="|".join(algorithm_names()))] = None
     """Algorithm; its default configuration is what the other arguments change."""
-    config: Annotated[Path | None, arg(metavar="FILE.yaml")] = None
-    """Configuration: only what differs from the algorithm's default."""
+    config: Annotated[Path | None, arg(metavar="FILE.yaml|NAME")] = None
+    """Configuration: only what differs from the algorithm's default; or the name of a shipped agent's."""
+    initial: Annotated[Path | None, arg(metavar="FILE.safetensors")] = None
+    """Agent to go on from, with the same observation and action."""
     steps: Annotated[int | None, arg(metavar="N")] = None
     """Actions in all, over all environments."""
     seed: Annotated[int | None, arg(metavar="S")] = None
@@ -84,7 +86,12 @@ def _check(command: TrainCommand) -> None:
 
 def _config(command: TrainCommand) -> TrainingConfig:
     return load_config(
-        command.algo, command.config, steps=command.steps, seed=command.seed, n_envs=command.envs
+        command.algo,
+        command.config,
+        steps=command.steps,
+        seed=command.seed,
+        n_envs=command.envs,
+        initial=None if command.initial is None else str(command.initial),
     )
 
 

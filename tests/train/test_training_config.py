@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 
 import pytest
 import yaml
@@ -12,7 +13,14 @@ from motion_cueing.envs.car import drive_seeds, maneuver_names, recording_names
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.settings import load, save
 from motion_cueing.envs.task.library import library_of
-from motion_cueing.train.config import Choice, TrainingConfig, load_config, merge, validation_task
+from motion_cueing.train.config import (
+    Choice,
+    TrainingConfig,
+    load_config,
+    merge,
+    recipe_names,
+    validation_task,
+)
 from motion_cueing.train.registry import algorithm_names, get_algorithm, preset_file
 
 from . import tiny
@@ -30,6 +38,14 @@ def test_no_preset_trains_or_validates_on_what_is_evaluated(name):
     trained = {drive.name for drive in library_of(episode, config.task.randomisation)}
     assert len(trained) == 2
     assert not trained & evaluated
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_no_shipped_agent_was_trained_or_validated_on_what_is_evaluated(name):
+    config = load_config(None, Path(name))
+    assert config.task.episode.drives == ()
+    assert config.task.episode.random.cars == ("sedan",)
+    assert config.validation.seed != config.task.episode.library_seed
 
 
 @pytest.mark.parametrize("drive", [*maneuver_names(), *recording_names()])
