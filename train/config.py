@@ -173,7 +173,8 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
 
     Args:
         algo: The algorithm; None for the one that the file names.
-        path: YAML file with any of the fields, or the name of one of :func:`recipe_names`; mappings are merged (but for ``search``), all else replaces.
+        path: YAML file with any of the fields, or one of :func:`recipe_names`; mappings are merged (but for
+            ``search``), all else replaces.
         **fields: Fields of :class:`TrainingConfig` that go before the file; None leaves one as it is.
 
     Raises:
