@@ -163,7 +163,7 @@ def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
     named = find_maneuvers([name for name in options.maneuvers if name != TRAIN], car)
     drives: list[CueTrace] = []
     if TRAIN in options.maneuvers:
-        drives += random_drives(options.drives, options.duration, options.drives_seed)
+        drives += random_drives(options.drives, options.duration, options.drives_seed, drives=options.roads)
     for label, source in named.items():
         try:
             drives.append(source())
@@ -202,8 +202,8 @@ def _held_out(search: Search) -> Objective:
     from ..baselines.tuning.options import HELD_OUT, HELD_OUT_SEED
     from ..envs.car import random_drives
 
-    given = search.objective
-    drives = random_drives(HELD_OUT, search.options.duration, HELD_OUT_SEED)
+    given, options = search.objective, search.options
+    drives = random_drives(HELD_OUT, options.duration, HELD_OUT_SEED, drives=options.roads)
     return Objective(drives, given.platform, given.measure, given.threads)
 
 

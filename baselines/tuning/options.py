@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from ...envs.car import drive_seeds
+from ...envs.car import RandomDrives, drive_seeds
 from ...envs.errors import ConfigurationError
 from ...envs.settings import Positive, configuration
 from ..washout import WashoutParameters
@@ -18,6 +18,9 @@ HELD_OUT_SEED: Final = 1_000_000
 """Of the random drives a search never sees: those that agents are validated on."""
 HELD_OUT: Final = 64
 """Their number."""
+
+ROADS: Final = RandomDrives(urban=0.3, rural=0.2, highway=0.1, track=0.4)
+"""What the shipped agents are trained on: fierce drives are many, because maneuvers are fierce."""
 
 Count = Annotated[int, Field(ge=0, lt=2**32)]
 
@@ -33,6 +36,7 @@ class TuningOptions:
         maneuvers: "train" for random drives, or names of maneuvers and recordings.
         drives: Number of random drives, if any.
         duration: Of each, s.
+        roads: What the random drives are drawn from.
         drives_seed: Of the random drives; the one that agents are trained with unless told otherwise.
         budget: Time to simulate, h.
         seed: Of everything else that is drawn.
@@ -44,6 +48,7 @@ class TuningOptions:
     maneuvers: Annotated[tuple[str, ...], Field(min_length=1)] = (TRAIN,)
     drives: Annotated[int, Field(ge=1)] = 256
     duration: Positive = 60.0
+    roads: RandomDrives = ROADS
     drives_seed: Count = 0
     budget: Positive = 1000.0
     seed: Count = 0

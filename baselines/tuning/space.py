@@ -64,11 +64,11 @@ _TRANSLATION: Final = (0.03, 2.5)
 """rad/s; up to Reid and Nahon's sets. Below, the machine is not back for what comes half a minute later."""
 _HEAVE: Final = (0.1, 10.0)
 _ROLL_OFF: Final = (10.0, 200.0)
-_TILT: Final = (0.1, 5.0)
-"""rad/s; up to Reid and Nahon's sets. Above, tilt takes over the onset, and the road's roughness with it."""
+_TILT: Final = (0.1, 20.0)
+"""rad/s; published sets have up to 5, but above that only the limits on rate and acceleration count."""
 _TILT_RATE: Final = (math.radians(0.5), math.radians(5.0))
-"""Up to the largest limit in use, with the acceleration below: doi 10.1177/0037549716675955."""
-_TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(8.0))
+"""Up to the largest limit in use: doi 10.1177/0037549716675955."""
+_TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(60.0))
 _APPROACH: Final = (0.5, 50.0)
 _SPLIT: Final = (0.3, 60.0)
 
