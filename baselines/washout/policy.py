@@ -120,6 +120,11 @@ def _checked_state(state: Any, dtype: np.dtype[Any], n: int) -> Array:
     return state
 
 
+def _as_bytes(memory: NDArray[Any]) -> NDArray[np.uint8]:
+    """A memory as bytes, which NumPy copies at once; structures it copies field by field."""
+    return np.ascontiguousarray(memory).view(np.uint8)
+
+
 def _kind(values: Any) -> str:
     if not isinstance(values, np.ndarray):
         return f"of type {type(values).__name__}"
@@ -183,13 +188,14 @@ class ClassicalWashout:
         if episode_start is not None:
             episode_start = _checked_start(episode_start, n)
         if state is not None:
-            buffers.views["memory"][...] = _checked_state(state, memory.dtype, n)
+            _as_bytes(buffers.views["memory"])[...] = _as_bytes(_checked_state(state, memory.dtype, n))
         buffers.views["observation"][...] = observation
         buffers.views["begins"][...] = (
             True if state is None else episode_start if episode_start is not None else False
         )
         buffers.launch.launch()
-        return action.reshape(*observation.shape[:-1], N_AXES).copy(), memory.copy()
+        remembered = _as_bytes(memory).copy().view(memory.dtype)
+        return action.reshape(*observation.shape[:-1], N_AXES).copy(), remembered
 
     def _make_buffers(self, n: int) -> _Buffers:
         parameters_of = wp.zeros(n, dtype=int, device="cpu")
