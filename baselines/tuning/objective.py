@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -20,7 +20,7 @@ Measure = Literal["J", "perceived"]
 """What is averaged over the drives: J, or J of what the driver senses."""
 
 LIMIT_STEP: Final = 1.0
-"""Added to J of a set that meets a limit anywhere, however briefly."""
+"""Added to J of a set that meets a limit where it may not, however briefly."""
 LIMIT_SLOPE: Final = 1000.0
 """Times the share of time at a limit, and added, too: 0.1 % costs 1, so that the way back is downhill."""
 _BROKEN: Final = 1e9
@@ -35,13 +35,15 @@ class Judgement:
         cue_error: Mean J of the drives.
         perceived_error: Mean perceived J.
         at_limit: Share of time in which any limit is met.
+        violation: The same of the drives in which none may be met.
         cost: What the search minimises.
-        limited: (sets, drives) share of time in which any limit is met.
+        limited: (sets, drives) the same of each drive; 0 in those that are spared.
     """
 
     cue_error: Floats
     perceived_error: Floats
     at_limit: Floats
+    violation: Floats
     cost: Floats
     limited: Floats
 
@@ -54,17 +56,24 @@ class Objective:
         platform: The machine, without lag or dead time.
         measure: What is minimised.
         threads: Launches side by side.
+        spared: Drives in which limits may be met: what that does to J is all it costs.
 
     Raises:
         ConfigurationError: there is no drive.
     """
 
     def __init__(
-        self, drives: Sequence[CueTrace], platform: Platform, measure: Measure = "J", threads: int = 1
+        self,
+        drives: Sequence[CueTrace],
+        platform: Platform,
+        measure: Measure = "J",
+        threads: int = 1,
+        spared: Collection[int] = (),
     ) -> None:
         if not drives:
             raise ConfigurationError("drives is empty; a search needs at least one drive")
         self.drives, self.platform, self.measure, self.threads = list(drives), platform, measure, threads
+        self.spared = frozenset(spared)
 
     def judge(
         self,
@@ -80,14 +89,17 @@ class Objective:
             guards: Further drives in which no limit may be met either.
         """
         counted = list(range(len(self.drives))) if drives is None else list(drives)
-        driven = [self.drives[i] for i in [*counted, *guards]]
-        scores = WashoutBatch(sets, driven, self.platform).scores(threads=self.threads)
+        driven = [*counted, *guards]
+        batch = WashoutBatch(sets, [self.drives[i] for i in driven], self.platform)
+        scores = batch.scores(threads=self.threads)
         cue = scores.cue_error[:, : len(counted)].mean(axis=1)
         perceived = scores.perceived_error[:, : len(counted)].mean(axis=1)
-        at_limit = scores.at_limit.mean(axis=1)
-        cost = (cue if self.measure == "J" else perceived) + penalty(at_limit)
+        hard = np.array([i not in self.spared for i in driven])
+        limited = np.where(hard, scores.at_limit, 0.0)
+        violation = limited.sum(axis=1) / max(1, int(hard.sum()))
+        cost = (cue if self.measure == "J" else perceived) + penalty(violation)
         cost = np.nan_to_num(cost, nan=_BROKEN, posinf=_BROKEN)
-        return Judgement(cue, perceived, at_limit, cost, scores.at_limit)
+        return Judgement(cue, perceived, scores.at_limit.mean(axis=1), violation, cost, limited)
 
     def hours(self, drives: Sequence[int] | None = None) -> float:
         """Simulated time of one set through drives, default all, h."""

@@ -34,6 +34,8 @@ class TuningOptions:
         objective: J, or J of what the driver senses.
         method: "cma", or "gradient" through the machine's own equations.
         maneuvers: "train" for random drives, or names of maneuvers and recordings.
+        limits: Where no limit may be met: in "all" drives, or on "roads", which spares the random drives on a
+            track; a set that takes the fiercest of them without a limit is a timid one on every road.
         drives: Number of random drives, if any.
         duration: Of each, s.
         roads: What the random drives are drawn from.
@@ -46,6 +48,7 @@ class TuningOptions:
     objective: Measure = "J"
     method: Literal["cma", "gradient"] = "cma"
     maneuvers: Annotated[tuple[str, ...], Field(min_length=1)] = (TRAIN,)
+    limits: Literal["roads", "all"] = "roads"
     drives: Annotated[int, Field(ge=1)] = 256
     duration: Positive = 60.0
     roads: RandomDrives = ROADS
