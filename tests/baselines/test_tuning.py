@@ -117,6 +117,20 @@ def test_a_limit_costs_more_than_it_gains():
     guarded = both.judge([START, open_], [0], guards=[1])
     np.testing.assert_array_equal(guarded.cue_error, alone.cue_error)
     assert guarded.cost[1] == alone.cost[1] + penalty(guarded.at_limit)[1] > alone.cost[1] + LIMIT_STEP
+    assert guarded.violation[1] == guarded.at_limit[1]
+
+
+def test_limits_may_be_met_in_drives_that_are_spared():
+    hard = trace(6.0, lambda t: np.column_stack([np.where(t > 1.0, -9.0, 0.0), 0.0 * t]))
+    open_ = replace(START, force_scale=(1.0, 1.0, 1.0), hps=(HighPass(), HighPass()))
+    strict, spared = (
+        Objective([DRIVES[0], hard], PAPER, spared=which).judge([open_]) for which in ((), (1,))
+    )
+    assert strict.at_limit[0] == spared.at_limit[0] > 0.0
+    assert strict.violation[0] == pytest.approx(strict.at_limit[0])
+    assert (spared.violation[0], spared.limited.max()) == (0.0, 0.0)
+    assert spared.cost[0] == spared.cue_error[0] == strict.cue_error[0] < strict.cost[0]
+    assert Objective([hard], PAPER, spared=[0]).judge([open_]).violation[0] == 0.0
 
 
 def test_hours_are_those_of_the_drives():

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from motion_cueing.baselines import make_policy
+from motion_cueing.baselines.tuning.options import TuningOptions
 from motion_cueing.baselines.tuning.search import Status, load_record
 from motion_cueing.baselines.washout import load_washout
+from motion_cueing.envs.car import random_drives
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import tune_command
 from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.tune_command import _spared
 from motion_cueing.evaluation.tune_progress import TuningProgress
 from motion_cueing.train.interrupt import Interrupt
 
@@ -56,6 +60,15 @@ def test_random_drives_are_the_default_and_others_are_held_out(tmp_path, monkeyp
     assert "on 64 random drives held out: classical-tuned J" in told
     record = load_record(tmp_path / "classical-tuned.search.json")
     assert (record.options.maneuvers, record.options.objective) == (("train",), "perceived")
+
+
+def test_random_drives_on_a_track_are_spared_unless_told_otherwise():
+    options = TuningOptions(start=load_washout("classical"), drives=12)
+    drives = random_drives(options.drives, 1.0, options.drives_seed, drives=options.roads)
+    kinds = [drive.source.split()[1] for drive in drives]
+    assert 0 < kinds.count("track") < len(kinds)
+    assert [kinds[i] for i in _spared(options, drives)] == ["track"] * kinds.count("track")
+    assert _spared(replace(options, limits="all"), drives) == []
 
 
 def test_ctrl_c_keeps_the_search_and_resume_ends_where_it_would_have(words, tmp_path, monkeypatch, capsys):
