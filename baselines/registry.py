@@ -10,7 +10,7 @@ from ..envs.platform.machines import Platform
 from .policy import NoMotion, Policy
 from .washout import ClassicalWashout, load_washout, washout_presets
 
-_DEFAULT: Final = ("no-motion", "classical", "est1", "brk")
+_DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
 
 def policy_names() -> list[str]:

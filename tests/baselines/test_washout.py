@@ -126,11 +126,16 @@ def test_after_a_violent_drive_the_machine_comes_home(name):
     policy = ClassicalWashout(name)
     felt = rollout(policy, trace(300.0, burst, spin))
     assert felt.limits_active.any(axis=1).sum() > 50
-    # EST's HPS of 0.05 rad/s returns from so far in this time to within a meter or two by itself.
-    near = 2.0 if name.startswith("est") else 0.01
+    # A HPS of 0.05 rad/s, as EST's, returns from so far in this time to within a meter or two by itself.
+    slowest = min((part.frequency for part in policy.parameters.hps if part.order == 2), default=1.0)
+    near = 2.0 if slowest <= 0.05 else 0.01
     assert np.abs(felt.carriage[-1] - policy.start[:2]).max() < near
     assert np.abs(felt.hexapod[-1, :2]).max() < 0.1
-    assert np.abs(felt.hexapod[-1, 2:]).max() < 1e-3
+    assert np.abs(felt.hexapod[-1, 2:5]).max() < 1e-3
+    # The hexapod's part of the yaw returns as HPR lets it, which with a turntable may be hardly at all.
+    yaw_high_pass, share = policy.parameters.hpr[2], 1.0 - policy.parameters.turntable_share
+    kept = np.exp(-290.0 * yaw_high_pass.frequency)
+    assert np.abs(felt.hexapod[-1, 5]) < 1e-3 + share * kept * np.abs(spin(felt.time)[:, 2]).sum() * 0.01
     assert not felt.limits_active[-10000:].any()
 
 
