@@ -49,6 +49,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "render": Command(".render_command", "RenderCommand", "draw a drive as a film or a picture"),
     "export": Command(".export_command", "ExportCommand", "write an agent as an ONNX file"),
     "train": Command("..train.train_command", "TrainCommand", "train an agent on random drives"),
+    "curves": Command(".curves_command", "CurvesCommand", "draw what trainings came to over their steps"),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
 }
 
