@@ -64,16 +64,20 @@ def arguments(
     found = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
     found["policy_kwargs"] = _policy_kwargs(algorithm, found.get("policy_kwargs") or {})
     checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in found.items()}
-    checked[_POLICY] = _policy(algorithm, hyperparameters.get(_POLICY, "MlpPolicy"))
+    checked[_POLICY] = _policy(
+        algorithm, hyperparameters.get(_POLICY, "MlpPolicy"), bool(hyperparameters.get("use_sde"))
+    )
     if "noise_type" in hyperparameters or "noise_std" in hyperparameters:
         checked["action_noise"] = _noise(hyperparameters, action_size)
     return checked
 
 
-def _policy(algorithm: type[BaseAlgorithm], name: Any) -> Any:
+def _policy(algorithm: type[BaseAlgorithm], name: Any, use_sde: bool) -> Any:
     known = {"MlpPolicy": "MlpPolicy"} | ({"SkipPolicy": SkipPolicy} if algorithm is PPO else {})
     if name not in known:
         raise ConfigurationError(f"hyperparameters.policy: {name!r}; use one of {', '.join(known)}")
+    if known[name] is SkipPolicy and use_sde:
+        raise ConfigurationError("hyperparameters.use_sde must be off with policy SkipPolicy")
     return known[name]
 
 

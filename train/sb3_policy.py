@@ -48,10 +48,9 @@ class SkipPolicy(ActorCriticPolicy):
         self.mlp_extractor = extractor.to(self.device)
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
-        mean = torch.tanh(self.action_net(latent_pi))
-        if not isinstance(self.action_dist, DiagGaussianDistribution):
-            raise NotImplementedError("use_sde has no tanh of the mean")
-        return self.action_dist.proba_distribution(mean, self.log_std)
+        # use_sde, which has another distribution, is refused in hyperparameters.py.
+        assert isinstance(self.action_dist, DiagGaussianDistribution)
+        return self.action_dist.proba_distribution(torch.tanh(self.action_net(latent_pi)), self.log_std)
 
     @property
     def hidden(self) -> list[nn.Module]:

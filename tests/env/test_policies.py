@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
+from motion_cueing.baselines.washout import HighPass, load_washout
 from motion_cueing.envs.car import get_maneuver, maneuver_names
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.observation import OBSERVATION_SIZE
@@ -19,10 +21,18 @@ from motion_cueing.evaluation import rollout
 
 from .tasks import drive
 
+# EST1 begins off the middle; from neutral, where an episode begins, it needs stronger high-passes.
+CENTRED = replace(
+    load_washout("est1"),
+    hps=(HighPass(2, 0.12),) * 2,
+    hpi=(HighPass(1, 0.15), HighPass(1, 0.15), HighPass(2, 2.0)),
+    start_carriage=(0.0, 0.0),
+)
 POLICIES = {
     "no-motion": NoMotion(),
     "classical": ClassicalWashout("classical"),
     "est1": ClassicalWashout("est1"),
+    "est1-centred": ClassicalWashout(CENTRED),
     "brk": ClassicalWashout("brk"),
 }
 
@@ -77,11 +87,13 @@ def test_default_reward_is_the_headline_metric_and_little_more(suite):
     charged = np.array([getattr(weights, name) for name in TERMS])
     at_limits = [TERMS.index(name) for name in ("stroke", "limits", "tilt_rate")]
     checked = 0
-    for costs, rewards, terms in suite.values():
+    for name, (costs, rewards, terms) in suite.items():
         assert np.allclose(-rewards, terms @ charged, rtol=1e-5)
         assert np.all(-rewards > 0.99 * costs)
+        # The paper's own EST1 meets limits from neutral; the others keep off them nearly everywhere.
         limited = (terms * charged)[:, at_limits].sum(axis=1) > 0.005 * costs
-        assert np.all((-rewards < 1.01 * costs)[~limited])
+        limited &= name == "est1"
+        assert np.all((-rewards < 1.01 * costs)[~limited]), name
         checked += np.sum(~limited)
     assert checked > 0.75 * len(suite) * len(maneuver_names())
 

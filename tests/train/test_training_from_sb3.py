@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
-from stable_baselines3 import PPO
+from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecNormalize
 
-from motion_cueing.envs.errors import DataError
+from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.task import ObservationOptions
 from motion_cueing.envs.task.layout import layout_of
 from motion_cueing.train.from_sb3 import load_network, network_of
+from motion_cueing.train.hyperparameters import arguments
 from motion_cueing.train.sb3_learner import CLASSES
 from motion_cueing.train.sb3_policy import SkipPolicy
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
@@ -163,3 +164,11 @@ def test_what_a_network_cannot_hold_is_refused(policy, message):
     model = PPO("MlpPolicy", DrivingSimulatorVecEnv(2, episode=SHORT), policy_kwargs=policy)
     with pytest.raises(DataError, match=message):
         network_of(model)
+
+
+def test_noise_that_depends_on_the_state_is_refused_where_the_mean_goes_through_a_tanh():
+    assert arguments(PPO, {"policy": "SkipPolicy"}, 9)["policy"] is SkipPolicy
+    with pytest.raises(ConfigurationError, match=r"hyperparameters\.use_sde"):
+        arguments(PPO, {"policy": "SkipPolicy", "use_sde": True}, 9)
+    with pytest.raises(ConfigurationError, match=r"hyperparameters\.policy"):
+        arguments(SAC, {"policy": "SkipPolicy"}, 9)
