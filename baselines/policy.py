@@ -14,6 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..envs.cues import CueTrace
 from ..envs.simulator import N_AXES
 
 Array = NDArray[Any]
@@ -40,6 +41,19 @@ class Policy(Protocol):
 
         Returns:
             Accelerations (n, 9) or (9,) in the order of ``AXES``, m/s^2 and rad/s^2, and the next state.
+        """
+        ...
+
+
+@runtime_checkable
+class ForeknowingPolicy(Protocol):
+    """A policy that is told the drive before it begins: some of it (preview), or all."""
+
+    def for_drive(self, cues: CueTrace) -> Policy:
+        """The policy for one drive, whose first call sees the machine at the first sample.
+
+        Args:
+            cues: The drive, at the time step of the rollout.
         """
         ...
 

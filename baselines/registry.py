@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
-from .policy import NoMotion, Policy
+from .policy import ForeknowingPolicy, NoMotion, Policy
 from .washout import ClassicalWashout, load_washout, washout_presets
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A policy that goes by a name.
+
+    Args:
+        description: One line.
+        make: The policy for a machine; libraries that only it needs are imported here.
+    """
+
+    description: str
+    make: Callable[[Platform], Policy | ForeknowingPolicy]
+
+
+_ENTRIES: Final[Mapping[str, Entry]] = {
+    NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
+}
+"""Policies by name, beside the washout's presets."""
 
 _DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
 
 def policy_names() -> list[str]:
     """Names :func:`make_policy` knows."""
-    return [NoMotion.name, *washout_presets()]
+    return [*_ENTRIES, *washout_presets()]
 
 
 def default_policies() -> list[str]:
@@ -25,12 +46,12 @@ def default_policies() -> list[str]:
 
 def describe_policy(name: str) -> str:
     """One line about a policy."""
-    if name == NoMotion.name:
-        return "the machine stands still"
+    if name in _ENTRIES:
+        return _ENTRIES[name].description
     return load_washout(name).description
 
 
-def make_policy(name: str | Path, platform: Platform) -> Policy:
+def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
     """A policy for a machine, by name or from a washout's YAML file.
 
     Raises:
@@ -38,8 +59,8 @@ def make_policy(name: str | Path, platform: Platform) -> Policy:
         DataError: the file does not exist or cannot be read.
         ConfigurationError: a field of the file is wrong.
     """
-    if str(name) == NoMotion.name:
-        return NoMotion()
+    if str(name) in _ENTRIES:
+        return _ENTRIES[str(name)].make(platform)
     if Path(name).suffix in (".yaml", ".yml"):
         return ClassicalWashout(load_washout(name), platform.cab)
     if str(name) in washout_presets():

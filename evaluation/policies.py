@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .. import baselines
-from ..baselines import Policy
+from ..baselines import ForeknowingPolicy, Policy
 from ..envs.errors import UnknownNameError
 from ..envs.platform import Platform
 from ..train.agent import Agent, agent_names, get_agent
@@ -40,7 +40,7 @@ def find_agent(name: str) -> Agent:
     return Agent.load(name) if name not in agent_names() and is_file(name) else get_agent(name)
 
 
-def make_policy(name: str, platform: Platform) -> Policy | TaskPolicy:
+def make_policy(name: str, platform: Platform) -> Policy | TaskPolicy | ForeknowingPolicy:
     """A policy for a machine, by name, or from the file of a washout or an agent.
 
     Raises:

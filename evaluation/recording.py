@@ -61,7 +61,7 @@ def trajectory_of(
     Args:
         recording: The drive.
         driver: That drove it.
-        policy: For its name and parameters.
+        policy: For its name, its parameters, and its ``notes``: what it counted, as text.
         cues: That were driven.
         car: That was driven, for the record.
     """
@@ -103,5 +103,6 @@ def trajectory_of(
             "parameters": json.dumps(to_dict(parameters)) if parameters is not None else "{}",
             "vestibular": driver.simulator.vestibular.name,
             "source": cues.source,
+            **getattr(policy, "notes", {}),
         },
     )

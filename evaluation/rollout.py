@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from ..baselines.policy import Policy, start_of
+from ..baselines.policy import ForeknowingPolicy, Policy, start_of
 from ..envs.car import Car
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
@@ -19,7 +19,7 @@ from .trajectory import Trajectory
 
 
 def rollout(
-    policy: Policy | TaskPolicy,
+    policy: Policy | TaskPolicy | ForeknowingPolicy,
     cues: CueTrace,
     platform: Platform | None = None,
     car: Car | None = None,
@@ -34,6 +34,7 @@ def rollout(
     Args:
         policy: Anything with ``predict``. One with a ``task``, as an agent has, sees the observations of
             that environment and acts in it; any other sees ``envs.observation`` and asks for accelerations.
+            One with ``for_drive`` is told the cues first. Its ``notes``, if any, become metadata.
         cues: The drive; another time step is resampled.
         platform: The machine; default: that of the policy's task, or the paper's.
         car: The car that was driven, for the record.
@@ -56,6 +57,8 @@ def rollout(
             f"platform must be a Platform, found {type(platform).__name__}; get_platform(name)"
         )
     cues = cues.resampled(dt)
+    if isinstance(policy, ForeknowingPolicy):
+        policy = policy.for_drive(cues)
     driver = make_driver(policy, cues, platform, vestibular or get_vestibular_model("zacharias"), dt)
     recording = record(driver, start_of(policy) if start is None else start, on_step)
     return trajectory_of(recording, driver, policy, cues, car)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..baselines import make_policy
+from ..baselines import ClassicalWashout
 from ..envs.task.library import platform_of
 from .agent import Agent, Record
 from .base_policy import DEFAULT, base_parameters
@@ -121,7 +121,7 @@ class Training:
         return Outcome(self.status, interrupted=False)
 
     def _measure_reference(self) -> None:
-        washout = make_policy(DEFAULT, platform_of(self.config.task))
+        washout = ClassicalWashout(DEFAULT, platform_of(self.config.task).cab)
         score = self.validation.score_policy(washout)
         self.status.reference = score.cue_error
         scalars = {"J": score.cue_error, "perceived_J": score.perceived_error}

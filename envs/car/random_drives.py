@@ -1,4 +1,4 @@
-"""Random drives for training: seeded, of any length, on urban, rural and highway roads, and on a track."""
+"""Random drives for training: seeded, of any length, on roads of several kinds and on a track."""
 
 from __future__ import annotations
 
@@ -39,6 +39,7 @@ class RandomDrives:
         rural: Of rural drives.
         highway: Of highway drives.
         track: Of fierce drives on a handling track.
+        hilly: Of drives over steep hills and crests.
         cars: Cars to draw from, by name.
     """
 
@@ -46,6 +47,7 @@ class RandomDrives:
     rural: NonNegative = 0.3
     highway: NonNegative = 0.2
     track: NonNegative = 0.0
+    hilly: NonNegative = 0.0
     cars: Annotated[tuple[str, ...], Field(min_length=1)] = ("sedan",)
 
     def __post_init__(self) -> None:
@@ -91,7 +93,7 @@ def random_drive(
     Args:
         seed: The same seed gives the same drive.
         duration: 0.1 s to a day, s.
-        kind: "urban", "rural", "highway" or "track"; drawn if None.
+        kind: "urban", "rural", "highway", "track" or "hilly"; drawn if None.
         car: Drawn from ``drives.cars`` if None.
         drives: What to draw from.
 
@@ -154,6 +156,6 @@ def _slope(road: Road, points: int) -> Floats:
     stations = STEP * np.arange(points)
     fade = np.clip((stations - 100.0) / 200.0, 0.0, 1.0)
     amplitude, slope = road.draw(road.kind.grade), np.zeros(points)
-    for length in (road.draw((300.0, 600.0)), road.draw((700.0, 1500.0))):
+    for length in [road.draw(wave) for wave in road.kind.waves]:
         slope += 0.5 * amplitude * np.sin(2.0 * np.pi * stations / length + road.draw((0.0, 2.0 * np.pi)))
     return np.asarray(slope * fade**2 * (3.0 - 2.0 * fade))

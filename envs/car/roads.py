@@ -30,6 +30,7 @@ class RoadKind:
         transition: Length of their clothoids, m.
         lane_change: Duration of a lane change, s.
         grade: Amplitude of the slope, rad.
+        waves: Lengths of the two waves of the slope, m.
         events: Relative frequency of each event.
     """
 
@@ -43,10 +44,14 @@ class RoadKind:
     transition: Range
     lane_change: Range
     grade: Range
+    waves: tuple[Range, Range]
     events: dict[str, float]
 
 
 KMH: Final = 1.0 / 3.6
+
+ROLLING: Final[tuple[Range, Range]] = ((300.0, 600.0), (700.0, 1500.0))
+"""Waves of an ordinary road's slope, m."""
 
 KINDS: Final = {
     "urban": RoadKind(
@@ -60,6 +65,7 @@ KINDS: Final = {
         transition=(8.0, 20.0),
         lane_change=(2.8, 5.0),
         grade=(0.0, 0.02),
+        waves=ROLLING,
         events={"bend": 3, "corner": 3, "stop": 2.5, "slow": 2, "lane_change": 2, "roundabout": 1},
     ),
     "rural": RoadKind(
@@ -73,6 +79,7 @@ KINDS: Final = {
         transition=(20.0, 60.0),
         lane_change=(3.5, 6.0),
         grade=(0.0, 0.05),
+        waves=ROLLING,
         events={"bend": 6, "corner": 0.5, "stop": 0.5, "slow": 2, "lane_change": 1.5, "roundabout": 0.5},
     ),
     "highway": RoadKind(
@@ -86,6 +93,7 @@ KINDS: Final = {
         transition=(60.0, 150.0),
         lane_change=(4.5, 8.0),
         grade=(0.0, 0.03),
+        waves=ROLLING,
         events={"bend": 3, "slow": 2.5, "lane_change": 3},
     ),
     "track": RoadKind(
@@ -99,11 +107,26 @@ KINDS: Final = {
         transition=(10.0, 25.0),
         lane_change=(2.4, 4.0),
         grade=(0.0, 0.02),
+        waves=ROLLING,
         events={"bend": 3, "corner": 2, "stop": 1, "slow": 2, "lane_change": 3, "roundabout": 1, "weave": 2},
+    ),
+    "hilly": RoadKind(
+        speed=(40 * KMH, 90 * KMH),
+        accelerate=(0.8, 2.0),
+        brake=(1.0, 2.5),
+        lateral=(1.0, 2.5),
+        straight=(60.0, 400.0),
+        radius=(70.0, 500.0),
+        angle=(0.2, 1.0),
+        transition=(20.0, 60.0),
+        lane_change=(3.5, 6.0),
+        grade=(0.05, 0.12),
+        waves=((150.0, 300.0), (300.0, 700.0)),
+        events={"bend": 2, "slow": 1, "lane_change": 1},
     ),
 }
 """Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers; on the
-handling track those of a test driver."""
+handling track those of a test driver, in the hills slopes and crests of mountain roads."""
 
 CORNER_RADIUS: Final[Range] = (9.0, 18.0)
 """Of a right-angled turn at a crossing, m."""

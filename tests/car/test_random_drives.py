@@ -10,7 +10,7 @@ from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 
 ROADS = ("urban", "rural", "highway")
-KINDS = (*ROADS, "track")
+KINDS = (*ROADS, "track", "hilly")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_same_seed_same_drive_and_another_seed_another():
 
 def test_all_drives_of_a_batch_differ(batches):
     ends = {tuple(trace.specific_force[-1]) for kind in KINDS for trace in batches[kind]}
-    assert len(ends) == 96
+    assert len(ends) == 24 * len(KINDS)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -46,7 +46,13 @@ def test_each_begins_calm_and_lasts_as_long_as_asked(batches, kind):
 
 @pytest.mark.parametrize(
     ("kind", "side", "along"),
-    [("urban", 3.9, 3.6), ("rural", 3.9, 3.2), ("highway", 2.2, 2.3), ("track", 7.5, 7.0)],
+    [
+        ("urban", 3.9, 3.6),
+        ("rural", 3.9, 3.2),
+        ("highway", 2.2, 2.3),
+        ("track", 7.5, 7.0),
+        ("hilly", 3.2, 4.0),
+    ],
 )
 def test_accelerations_are_those_of_drivers(batches, kind, side, along):
     force = np.concatenate([trace.specific_force for trace in batches[kind]])
@@ -93,6 +99,13 @@ def test_the_track_is_fiercer_than_any_road_and_the_car_stays_on_it(batches):
     assert spread("track") > 1.3 * max(spread(kind) for kind in ROADS)
     offsets = [np.abs(trace.channels["path_offset_m"]).max() for trace in batches["track"]]
     assert max(offsets) < 1.0
+
+
+def test_the_hills_are_steeper_than_any_other_road(batches):
+    def spread(kind):
+        return np.concatenate([trace.specific_force[:, 2] for trace in batches[kind]]).std()
+
+    assert spread("hilly") > 3.0 * max(spread(kind) for kind in (*ROADS, "track"))
 
 
 def test_kinds_follow_their_shares():
