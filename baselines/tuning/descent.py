@@ -15,8 +15,8 @@ from numpy.lib.recfunctions import structured_to_unstructured
 from numpy.typing import NDArray
 
 from ..washout.batch import WashoutBatch
-from ..washout.policy import kernel_parameters
-from ..washout.step import Parameters
+from ..washout.classical import kernel_parameters
+from ..washout.structs import Parameters
 from .method import Found
 from .objective import Objective
 from .space import WashoutSpace

@@ -20,10 +20,10 @@ from ...envs.platform.state import SetPoint
 from ...envs.precision import real, vec9
 from ...envs.simulator import Simulator
 from ...envs.state import State
-from .kernels import Score, act, drive_through
-from .parameters import WashoutParameters
-from .policy import kernel_parameters, start_pose
-from .step import Memory, Parameters
+from .classical import CLASSICAL
+from .family import Family, FamilyParameters, start_pose
+from .kernels import Score, act
+from .structs import Memory
 
 Floats = NDArray[np.float64]
 
@@ -50,13 +50,18 @@ class WashoutBatch:
         sets: Parameter sets.
         drives: Cue traces of the same time step.
         platform: The machine, without lag or dead time.
+        family: The algorithm the sets are of.
 
     Raises:
         ConfigurationError: the machine has a lag or a dead time, which one fused launch does not simulate.
     """
 
     def __init__(
-        self, sets: Sequence[WashoutParameters], drives: Sequence[CueTrace], platform: Platform
+        self,
+        sets: Sequence[FamilyParameters],
+        drives: Sequence[CueTrace],
+        platform: Platform,
+        family: Family = CLASSICAL,
     ) -> None:
         if not sets or not drives:
             raise ConfigurationError("a washout batch needs at least one parameter set and one drive")
@@ -67,8 +72,9 @@ class WashoutBatch:
             raise ConfigurationError(
                 "actuator dynamics must be unity in a washout batch; use rollout instead"
             )
-        values = [kernel_parameters(p, platform.cab) for p in sets]
-        self.parameters = wp.array(values, dtype=Parameters, requires_grad=True)
+        self.family = family
+        values = [family.values(p, platform.cab, self.simulator.dt) for p in sets]
+        self.parameters = wp.array(values, dtype=family.parameters, requires_grad=family is CLASSICAL)
         self.parameters_of = wp.array(np.repeat(np.arange(len(sets)), len(drives)), dtype=int)
         self.simulator.reset(np.repeat([start_pose(p) for p in sets], len(drives), axis=0))
 
@@ -89,9 +95,9 @@ class WashoutBatch:
             first, last = int(bounds[part]), int(bounds[part + 1])
             inputs = [*simulator.constants, simulator.delay_array, self.parameters, self.parameters_of]
             inputs += [zone(cost or CueCost()), simulator.state_array, first]
-            wp.launch(drive_through, last - first, inputs=inputs, outputs=[score], device="cpu")
+            wp.launch(self.family.drive_through, last - first, inputs=inputs, outputs=[score], device="cpu")
 
-        drive_through.module.load(simulator.device)
+        self.family.drive_through.module.load(simulator.device)
         with ThreadPoolExecutor(len(bounds) - 1) as pool:
             list(pool.map(launch, range(len(bounds) - 1)))
         values = score.numpy()
@@ -106,8 +112,10 @@ class WashoutBatch:
             (sets,) costs and (sets,) structured gradients with the fields of the kernel's ``Parameters``.
 
         Raises:
-            ConfigurationError: there is not one step.
+            ConfigurationError: there is not one step, or the algorithm is not the classical one.
         """
+        if self.family is not CLASSICAL:
+            raise ConfigurationError("only the classical washout has a gradient; use method cma")
         if steps < 1:
             raise ConfigurationError(f"steps must be at least 1, found {steps}")
         n, keep = self.simulator.n, {"requires_grad": True}

@@ -1,4 +1,4 @@
-"""The classical washout as a policy."""
+"""A washout as a policy; the classical one."""
 
 from __future__ import annotations
 
@@ -12,67 +12,25 @@ from numpy.typing import NDArray
 from ...envs.errors import DataError
 from ...envs.observation import OBSERVATION_SIZE
 from ...envs.platform.machines import Cab
-from ...envs.precision import FLOAT, real, vec3, vec9
+from ...envs.precision import FLOAT, real, vec9
 from ...envs.simulator import N_AXES, TIME_STEP
 from ..policy import Array
-from .filters import HighPassParameters
-from .kernels import predict
-from .parameters import HighPass, LowPass, TiltCoordination, WashoutParameters, load_washout
-from .step import Memory, Parameters
-
-
-def _high_pass(block: HighPass) -> Any:
-    values: Any = HighPassParameters()
-    values.order, values.frequency, values.damping = block.order, block.frequency, block.damping
-    return values
-
-
-def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
-    """The kernels' form of a parameter set for a cab."""
-    k: Any = Parameters()
-    for name in ("force_scale", "force_limit", "rate_scale", "rate_limit"):
-        setattr(k, name, vec3(*getattr(p, name)))
-    blocks = {"hpr_roll": p.hpr[0], "hpr_pitch": p.hpr[1], "hpr_yaw": p.hpr[2], "hps_x": p.hps[0]}
-    blocks |= {"hps_y": p.hps[1], "hpi_x": p.hpi[0], "hpi_y": p.hpi[1], "hpi_z": p.hpi[2]}
-    for name, block in blocks.items():
-        setattr(k, name, _high_pass(block))
-    tilt = p.tilt or TiltCoordination()
-    k.tilt_gain = 1.0 if p.tilt else 0.0
-    k.tilt_frequency, k.tilt_damping = tilt.low_pass.frequency, tilt.low_pass.damping
-    k.tilt_rate, k.tilt_acceleration, k.tilt_approach = tilt.rate, tilt.acceleration, tilt.approach
-    lpc = p.lpc or LowPass(1.0)
-    k.carriage_share = 1.0 if p.lpc else 0.0
-    k.lpc_frequency, k.lpc_damping = lpc.frequency, lpc.damping
-    for name in (
-        "rate_bandwidth",
-        "turntable_share",
-        "turntable_gain",
-        "follow_frequency",
-        "return_frequency",
-    ):
-        setattr(k, name, getattr(p, name))
-    k.cab = vec3(*cab.reference_point)
-    return k
-
-
-def start_pose(p: WashoutParameters) -> Array:
-    """(9,) pose to begin a drive at: C'(0) and S'(0)."""
-    pose = np.zeros(N_AXES)
-    pose[:2], pose[2:5] = p.start_carriage, p.start_hexapod
-    return pose
+from .classical import CLASSICAL
+from .family import Family, FamilyParameters, start_pose
+from .parameters import WashoutParameters, load_washout
 
 
 class _Buffers:
     """Arrays of one batch size and the launch recorded on them."""
 
-    def __init__(self, n: int, parameters: Any, parameters_of: Any, dt: float) -> None:
+    def __init__(self, family: Family, n: int, parameters: Any, parameters_of: Any, dt: float) -> None:
         self.observation = wp.zeros((n, OBSERVATION_SIZE), dtype=real, device="cpu")
         self.begins = wp.zeros(n, dtype=wp.bool, device="cpu")
-        self.memory = wp.zeros(n, dtype=Memory, device="cpu")
-        self.after = wp.zeros(n, dtype=Memory, device="cpu")
+        self.memory = wp.zeros(n, dtype=family.memory, device="cpu")
+        self.after = wp.zeros(n, dtype=family.memory, device="cpu")
         self.action = wp.zeros(n, dtype=vec9, device="cpu")
         self.launch = wp.launch(
-            predict,
+            family.predict,
             n,
             inputs=[parameters, parameters_of, self.observation, self.begins, self.memory, real(dt)],
             outputs=[self.after, self.action],
@@ -132,42 +90,33 @@ def _kind(values: Any) -> str:
     return f"an array of {held} of shape {values.shape}"
 
 
-class ClassicalWashout:
-    """The paper's algorithm as a policy; its memory is the policy's state.
+class WashoutPolicy:
+    """An algorithm of the washout kind as a policy; its memory is the policy's state.
 
     Args:
-        parameters: A parameter set, a preset name or a YAML file.
+        family: The algorithm.
+        parameters: Its parameter set.
         cab: Where the driver sits on the machine.
         dt: Time step, s.
     """
 
-    def __init__(
-        self,
-        parameters: WashoutParameters | str | Path = "classical",
-        cab: Cab | None = None,
-        dt: float = TIME_STEP,
-    ) -> None:
-        if not isinstance(parameters, WashoutParameters):
-            parameters = load_washout(parameters)
-        self.parameters = parameters
+    def __init__(self, family: Family, parameters: FamilyParameters, cab: Cab | None, dt: float) -> None:
         self.name = parameters.name
         self.cab = cab or Cab()
         self.dt = dt
+        self._family = family
+        self._start = start_pose(parameters)
         self._kernel_parameters = wp.array(
-            [kernel_parameters(parameters, self.cab)], dtype=Parameters, device="cpu"
+            [family.values(parameters, self.cab, dt)], dtype=family.parameters, device="cpu"
         )
         self._buffers: dict[int, _Buffers] = {}
         # Compiled and loaded now, so that the first step of a drive takes no longer than the others.
         self._make_buffers(1).launch.launch()
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt)
-
     @property
     def start(self) -> Array:
         """(9,) pose to begin a drive at."""
-        return start_pose(self.parameters)
+        return self._start.copy()
 
     def predict(
         self,
@@ -202,5 +151,30 @@ class ClassicalWashout:
         return self._buffers_with(n, self._kernel_parameters, parameters_of)
 
     def _buffers_with(self, n: int, parameters: Any, parameters_of: Any) -> _Buffers:
-        self._buffers[n] = _Buffers(n, parameters, parameters_of, self.dt)
+        self._buffers[n] = _Buffers(self._family, n, parameters, parameters_of, self.dt)
         return self._buffers[n]
+
+
+class ClassicalWashout(WashoutPolicy):
+    """The paper's algorithm as a policy; its memory is the policy's state.
+
+    Args:
+        parameters: A parameter set, a preset name or a YAML file.
+        cab: Where the driver sits on the machine.
+        dt: Time step, s.
+    """
+
+    def __init__(
+        self,
+        parameters: WashoutParameters | str | Path = "classical",
+        cab: Cab | None = None,
+        dt: float = TIME_STEP,
+    ) -> None:
+        if not isinstance(parameters, WashoutParameters):
+            parameters = load_washout(parameters)
+        self.parameters = parameters
+        super().__init__(CLASSICAL, parameters, cab, dt)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made anew: Warp's arrays cannot be."""
+        return type(self), (self.parameters, self.cab, self.dt)

@@ -14,9 +14,10 @@ from ...envs.observation import OBSERVATION_SIZE
 from ...envs.platform.machines import Cab
 from ...envs.simulator import TIME_STEP
 from ..policy import Array
+from .classical import kernel_parameters
 from .parameters import WashoutParameters
-from .policy import ClassicalWashout, checked_observation, kernel_parameters
-from .step import Parameters
+from .policy import ClassicalWashout, checked_observation
+from .structs import Parameters
 
 KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "cue_scale": ("force_scale", "rate_scale"),
