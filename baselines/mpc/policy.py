@@ -1,0 +1,255 @@
+"""Model predictive control as a policy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...envs.cues import CueTrace
+from ...envs.observation import read
+from ...envs.platform import Platform
+from ...envs.simulator import N_AXES, TIME_STEP
+from ..policy import Array
+from .braking import Brakes
+from .forecast import REST, Forecaster
+from .linearisation import Floats
+from .parameters import MpcParameters
+from .planner import Planned, Planner
+from .solver import Rows
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a controller sees: positions and rates (9,), the car's cues and the cues' error (6,), SI."""
+
+    position: Floats
+    rate: Floats
+    wanted: Floats
+    error: Floats
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a controller knows of one machine.
+
+    Args:
+        sample: Of the drive, counted from the start.
+        angle: Turntable angle, unwound, rad.
+        plan: (n, 9) accelerations at the nodes when it was made.
+        age: Time steps since.
+        solved: Whether there is a plan.
+        active: Limits that held in it.
+        error: (6,) of the cues in the last step.
+        sensors: (6, 3) states of the vestibular filters.
+    """
+
+    sample: int
+    angle: float
+    plan: Floats
+    age: int
+    solved: bool
+    active: Rows
+    error: Floats
+    sensors: Floats
+
+
+@dataclass
+class Counts:
+    """What a controller counted.
+
+    Args:
+        solves: Plans made.
+        failures: Plans that were not found; the machine braked.
+        iterations: Programs solved for them.
+        rounds: Duals solved for them.
+        relaxed: Plans in which a linearised limit could not be kept.
+    """
+
+    solves: int = 0
+    failures: int = 0
+    iterations: int = 0
+    rounds: int = 0
+    relaxed: int = 0
+
+    def add(self, planned: Planned) -> None:
+        """One more."""
+        self.solves += 1
+        self.failures += not planned.solved
+        self.iterations += planned.iterations
+        self.rounds += planned.rounds
+        self.relaxed += planned.relaxed > _RELAXED
+
+
+_RELAXED = 1e-3
+"""Violation of a linearised limit from which on a plan counts as relaxed, share of its range."""
+
+
+class PredictiveController:
+    """A policy that makes a plan at every step and does the beginning of it.
+
+    Args:
+        platform: The machine.
+        parameters: Of the controller.
+        planner: Makes the plans.
+        name: In tables.
+        configuration: For the record, where it is more than ``parameters``.
+        cues: The drive, where some of it is known.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        parameters: MpcParameters,
+        planner: Planner,
+        name: str,
+        configuration: Any = None,
+        cues: CueTrace | None = None,
+    ) -> None:
+        self.name = name
+        self.parameters = configuration or parameters
+        self._mpc, self._planner = parameters, planner
+        self._forecast = Forecaster(planner.grid, parameters.forecast, cues)
+        self._brakes = Brakes(platform)
+        self._counts = Counts()
+
+    @property
+    def notes(self) -> Mapping[str, str]:
+        """What was counted so far, for a trajectory's metadata."""
+        return {f"mpc_{name}": str(value) for name, value in vars(self._counts).items()}
+
+    def predict(
+        self,
+        observation: Array,
+        state: Any = None,
+        episode_start: Array | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, Any]:
+        """Accelerations; see :meth:`~..policy.Policy.predict`. The state is a memory for each machine."""
+        rows = np.atleast_2d(observation)
+        begins = np.zeros(len(rows), bool) if episode_start is None else np.asarray(episode_start)
+        if begins.all():
+            self._counts = Counts()
+        known = [None] * len(rows) if state is None else state
+        answers = [
+            self._act(row, None if begin else memory)
+            for row, begin, memory in zip(rows, begins, known, strict=True)
+        ]
+        actions = np.array([action for action, _ in answers]).reshape(*np.shape(observation)[:-1], N_AXES)
+        return actions, [memory for _, memory in answers]
+
+    def _act(self, row: NDArray[Any], memory: Memory | None) -> tuple[Floats, Memory]:
+        memory = self._begun() if memory is None else memory
+        moment = _moment(row, memory.angle)
+        sensors = self._planner.perception.advance(memory.sensors, memory.error, moment.error)
+        memory = replace(memory, angle=moment.position[8], sensors=sensors, error=moment.error)
+        if memory.age >= self._mpc.every or not memory.solved:
+            memory = self._plan(moment, memory)
+        action = self._action(moment, memory)
+        return action, replace(memory, sample=memory.sample + 1, age=memory.age + 1)
+
+    def _begun(self) -> Memory:
+        n = len(self._planner.grid.times)
+        return Memory(
+            sample=0,
+            angle=0.0,
+            plan=np.zeros((n, N_AXES)),
+            age=0,
+            solved=False,
+            active=np.zeros(0, dtype=np.intp),
+            error=np.zeros(6),
+            sensors=self._planner.perception.start(),
+        )
+
+    def _plan(self, moment: Moment, memory: Memory) -> Memory:
+        grid = self._planner.grid
+        planned = self._planner(
+            moment.position,
+            moment.rate,
+            self._forecast(moment.wanted, memory.sample),
+            grid.at(memory.plan, grid.times + TIME_STEP * memory.age),
+            memory.active,
+            self._planner.perception.memory(memory.sensors, moment.error),
+        )
+        self._counts.add(planned)
+        plan = planned.plan.acceleration if planned.solved else np.zeros_like(memory.plan)
+        return replace(memory, plan=plan, age=0, solved=planned.solved, active=planned.active)
+
+    def _action(self, moment: Moment, memory: Memory) -> Floats:
+        """The mean acceleration of the plan over the next time step; braking without a plan."""
+        if not memory.solved:
+            return self._brakes(moment.position, moment.rate)
+        middle = TIME_STEP * (memory.age + 0.5)
+        return np.asarray(self._planner.grid.at(memory.plan, np.array([middle]))[0])
+
+
+def _moment(row: NDArray[Any], angle: float) -> Moment:
+    """What an observation says, the turntable's angle nearest to ``angle``."""
+    sine, cosine = read(row, "turntable")
+    measured = float(np.arctan2(sine, cosine))
+    turned = measured + 2.0 * np.pi * round((angle - measured) / (2.0 * np.pi))
+    position = [*(read(row, name) for name in ("carriage", "displacement", "beta")), np.array([turned])]
+    rate = [read(row, name) for name in ("carriage_rate", "velocity", "beta_rate", "turntable_rate")]
+    wanted = np.concatenate([read(row, "wanted_force"), read(row, "wanted_rate")])
+    felt = np.concatenate([read(row, "felt_force"), read(row, "felt_rate")])
+    # Observed forces have gravity at rest taken off.
+    return Moment(np.concatenate(position), np.concatenate(rate), wanted + REST, felt - wanted)
+
+
+class PreviewController:
+    """A predictive controller that is told the drive, and looks ahead as far as its preview goes.
+
+    Args:
+        platform: The machine.
+        parameters: Of the controller.
+        planner: Makes the plans.
+        name: In tables.
+        configuration: For the record, where it is more than ``parameters``.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        parameters: MpcParameters,
+        planner: Planner,
+        name: str,
+        configuration: Any = None,
+    ) -> None:
+        self.name = name
+        self.parameters = configuration or parameters
+        self._platform, self._mpc, self._planner = platform, parameters, planner
+
+    def for_drive(self, cues: CueTrace) -> PredictiveController:
+        """The policy for one drive.
+
+        Args:
+            cues: The drive, at the machine's time step.
+        """
+        return PredictiveController(
+            self._platform, self._mpc, self._planner, self.name, self.parameters, cues
+        )
+
+
+def make_controller(
+    platform: Platform, parameters: MpcParameters, planner: Planner, name: str, configuration: Any = None
+) -> PredictiveController | PreviewController:
+    """The policy with or without preview; arguments as of :class:`PreviewController`."""
+    kind = PreviewController if parameters.forecast.preview > 0.0 else PredictiveController
+    return kind(platform, parameters, planner, name, configuration)
+
+
+def make_mpc(
+    platform: Platform, parameters: MpcParameters | None = None, name: str = "mpc"
+) -> PredictiveController | PreviewController:
+    """Linear time-varying predictive control: the machine is linearised once a plan, about the last plan.
+
+    Args:
+        platform: The machine.
+        parameters: Of the controller; default: without preview.
+        name: In tables.
+    """
+    parameters = parameters or MpcParameters()
+    return make_controller(platform, parameters, Planner(platform, parameters), name)
