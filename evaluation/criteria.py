@@ -11,8 +11,23 @@ _ZONE = CueCost()
 
 
 @configuration
+class References:
+    """The policies between which the share of the gap is measured; see ``share.py``.
+
+    Args:
+        baseline: The washout at its best, share 0.
+        optimum: The lowest J there is, share 1.
+        perceived_optimum: The lowest perceived J there is, share 1 of the perceived J.
+    """
+
+    baseline: str = "classical-tuned"
+    optimum: str = "optimum"
+    perceived_optimum: str = "optimum-perceived"
+
+
+@configuration
 class Criteria:
-    """Published thresholds; the defaults are what every table of this project uses.
+    """Published thresholds, and what J is compared with; every table of this project has the defaults.
 
     Args:
         indifference_force: Error of specific force no driver minds, m/s^2 (Slob et al., Bosch Rexroth).
@@ -24,6 +39,7 @@ class Criteria:
         delay_range: Largest delay or lead searched, s; a cue that comes later is a missing cue instead.
         delay_correlation: Least correlation at which a delay is reported at all.
         action_tolerance: An applied acceleration this near the asked one is not clipped, m/s^2 and rad/s^2.
+        references: Policies between which the share of the gap is measured.
     """
 
     indifference_force: Positive = _ZONE.force
@@ -34,6 +50,7 @@ class Criteria:
     delay_range: Positive = 1.0
     delay_correlation: Positive = 0.5
     action_tolerance: Positive = 1e-4
+    references: References = References()
 
     @property
     def scales(self) -> tuple[float, ...]:

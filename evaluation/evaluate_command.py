@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError, DataError, MotionCueingError
 from ..envs.settings import to_dict
 from ..envs.storage import write_bytes
 from .figures import maneuver_figure
+from .ladder import ALL_RUNGS
+from .ladder_figure import ladder_figure
+from .ladder_table import ladder_table, save_ladder
 from .provenance import provenance
 from .report import save_report
 from .results import Results
 from .selection import ALL, find_car, find_maneuvers, find_platform, find_policies
 from .suite import CueSource, Drive, Outcome, run_suite
+from .suite_progress import suite_progress
 from .tables import print_results
+from .text_table import print_table
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -44,12 +47,13 @@ Folder = Annotated[Path, arg(metavar="DIR")]
 class EvaluateCommand:
     """Drive maneuvers with policies, and say which policy is better, by how much, and why.
 
-    Writes results.json, results.csv, report.html, one figure a maneuver, and every trajectory.
+    Writes results.json, results.csv, report.html, the ladder over all maneuvers, one figure a maneuver, and
+    every trajectory.
     `motion-cueing list` shows all names.
     """
 
     policy: Names = ()
-    """Policies, by name or file; without it, the ones meant for comparison."""
+    """Policies, by name or file; without it, the ones meant for comparison; `ladder` for all controllers."""
     maneuver: Names = (ALL,)
     """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
     platform: Name = "paper"
@@ -73,6 +77,7 @@ class Plan:
         car: The car.
         out: Folder of the output.
         arguments: The command line that asks for it.
+        left_out: Policies of the ladder that cannot be driven here, and why.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -81,6 +86,7 @@ class Plan:
     car: Car
     out: Path
     arguments: tuple[str, ...]
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -117,6 +123,8 @@ def run(command: EvaluateCommand) -> int:
     save(results, figures, plan.out)
     console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
     print_results(console, results)
+    if ALL_RUNGS in command.policy and results.standings:
+        print_table(console, ladder_table(results))
     console.print(
         f"Everything is in {plan.out}; open {plan.out / 'report.html'}", highlight=False, markup=False
     )
@@ -136,15 +144,32 @@ def make_plan(command: EvaluateCommand) -> Plan:
     if command.out.exists() and not command.out.is_dir():
         raise DataError(f"--out {command.out} is a file; name a folder")
     platform, car = find_platform(command.platform), find_car(command.car)
-    policies = find_policies(command.policy, platform)
+    policies, left_out = _line_up(command, platform, car)
     return Plan(
         maneuvers=find_maneuvers(command.maneuver, car),
-        policies={label: _drive_with(name, platform, car) for label, name in policies.items()},
+        policies=policies,
         platform=platform,
         car=car,
         out=command.out,
         arguments=command_line(command),
+        left_out=left_out,
     )
+
+
+def _line_up(
+    command: EvaluateCommand, platform: Platform, car: Car
+) -> tuple[dict[str, Drive], dict[str, str]]:
+    """Drives by label, and the reasons of those left out; a policy that is asked for by its name must fit."""
+    drives: dict[str, Drive] = {}
+    left_out: dict[str, str] = {}
+    for label, name in find_policies(command.policy, platform).items():
+        try:
+            drives[label] = _drive_with(name, platform, car)
+        except MotionCueingError as error:
+            if ALL_RUNGS not in command.policy or name in command.policy:
+                raise
+            left_out[label] = str(error)
+    return drives, left_out
 
 
 def command_line(command: EvaluateCommand) -> tuple[str, ...]:
@@ -163,7 +188,7 @@ def command_line(command: EvaluateCommand) -> tuple[str, ...]:
 def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
     """Drive and measure everything; figures by maneuver come beside the results."""
     output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies))
-    with _progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
+    with suite_progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
         outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance)
     return collect(plan, outcome), output.figures
 
@@ -176,14 +201,18 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
         (plan.car.name, to_dict(plan.car)),
         outcome.metadata,
     )
-    return Results.of(outcome.maneuvers, outcome.failures, origin)
+    return Results.of(outcome.maneuvers, outcome.failures, origin, left_out=plan.left_out)
 
 
 def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
-    """Write results.json, results.csv and report.html into a folder."""
+    """Write results.json, results.csv, the ladder and report.html into a folder."""
     results.save_json(folder / "results.json")
     results.save_csv(folder / "results.csv")
-    save_report(results, figures, folder / "report.html")
+    ladder = ladder_figure(results)
+    if ladder is not None:
+        save_ladder(results, folder)
+        write_bytes(folder / "ladder.png", ladder)
+    save_report(results, figures, folder / "report.html", ladder)
 
 
 def file_names(labels: Iterable[str]) -> dict[str, str]:
@@ -220,19 +249,3 @@ def _run_paper(command: EvaluateCommand) -> int:
     from .paper import run as run_paper
 
     return run_paper(command.out)
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[str, str], None]]:
-    """A bar on the terminal's error stream, so that the tables can be piped."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=total)
-        started = 0
-
-        def advance(maneuver: str, policy: str) -> None:
-            nonlocal started
-            bar.update(task, description=f"{maneuver}: {policy}", completed=started)
-            started += 1
-
-        yield advance

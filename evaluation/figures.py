@@ -12,6 +12,7 @@ from ..envs.platform import ACTUATORS
 from .criteria import Criteria
 from .figure_style import CAR, LIMIT, limit_lines, line_styles, new_figure, png, styled
 from .metrics import CUE_AXES, cab_motion, cue_error, tilt_rate
+from .share import gap_share
 from .trajectory import Floats, Trajectory
 
 _CUES = (
@@ -147,12 +148,18 @@ def _limit_activity(axes: Axes, drives: Drives, styles: Styles) -> None:
 
 
 def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> None:
-    """The cue error gathered so far; its last value is J."""
+    """The cue error gathered so far; its last value is J, and beside it the share of the gap."""
+    ends: dict[str, float] = {}
     for name, drive in drives.items():
         error = np.cumsum(cue_error(*cab_motion(drive), criteria)) / len(drive)
         axes.plot(drive.time, error, **styles[name])
-        axes.annotate(
-            f" {error[-1]:.2f}", (drive.time[-1], error[-1]), color=styles[name]["color"], fontsize=8
-        )
+        ends[name] = float(error[-1])
+    baseline, optimum = (
+        ends.get(name) for name in (criteria.references.baseline, criteria.references.optimum)
+    )
+    for name, end in ends.items():
+        share = gap_share(end, baseline, optimum)
+        text = f" {end:.2f}" if share is None else f" {end:.2f} ({share:.2f})"
+        axes.annotate(text, (drives[name].time[-1], end), color=styles[name]["color"], fontsize=8)
     axes.set_ylim(bottom=0.0)
     _label(axes, "Cue error up to now (ends at J)", "J")

@@ -90,6 +90,7 @@ class Metrics:
         clipped: Share of steps whose applied acceleration differs from the asked one.
         step_time_mean: Mean time the policy takes a step, s; None where not measured.
         step_time_p99: 99th percentile of it, s.
+        step_time_max: Longest of the drive, s.
     """
 
     duration: float
@@ -109,6 +110,7 @@ class Metrics:
     clipped: float
     step_time_mean: float | None
     step_time_p99: float | None
+    step_time_max: float | None = None
 
     @property
     def worst_axis(self) -> str:
@@ -126,7 +128,7 @@ def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics
         false |= signals.false_cues(wanted[:, i], felt[:, i], threshold)
         missing |= signals.missing_cues(wanted[:, i], felt[:, i], threshold)
     rate = tilt_rate(trajectory)
-    mean, p99 = _step_time(trajectory.step_time)
+    mean, p99, longest = _step_time(trajectory.step_time)
     flags = trajectory.limits_active
     return Metrics(
         duration=float(trajectory.time[-1] - trajectory.time[0]),
@@ -146,6 +148,7 @@ def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics
         clipped=_clipped(trajectory, criteria.action_tolerance),
         step_time_mean=mean,
         step_time_p99=p99,
+        step_time_max=longest,
     )
 
 
@@ -242,8 +245,9 @@ def _clipped(trajectory: Trajectory, tolerance: float) -> float:
     return float(np.mean(np.any(gap > tolerance, axis=1)))
 
 
-def _step_time(step_time: Floats) -> tuple[float | None, float | None]:
+def _step_time(step_time: Floats) -> tuple[float | None, float | None, float | None]:
+    """Mean, 99th percentile and maximum."""
     measured = step_time[np.isfinite(step_time)]
     if not len(measured):
-        return None, None
-    return float(measured.mean()), float(np.percentile(measured, 99.0))
+        return None, None, None
+    return float(measured.mean()), float(np.percentile(measured, 99.0)), float(measured.max())

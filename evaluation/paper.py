@@ -23,7 +23,7 @@ from .paper_checks import Check, Drives, all_checks
 from .paper_figures import paper_figures
 from .provenance import versions
 from .rollout import rollout
-from .tables import number
+from .text_table import number
 from .trajectory import Trajectory
 
 SCHEMA: Final = 1

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +15,8 @@ from ..envs.settings import configuration, from_dict, to_dict
 from ..envs.storage import write_text
 from .criteria import Criteria
 from .metrics import Metrics
+from .share import Share, shares
+from .spreadsheet import save_rows
 from .verdict import Standing, Verdict, judge, judge_suite
 
 SCHEMA: Final = 1
@@ -70,6 +71,8 @@ class Results:
         standings: Policies over the suite, best first.
         failures: Drives without a result.
         criteria: The thresholds the metrics were measured with.
+        shares: Share of the gap by maneuver and policy.
+        left_out: Policies that were asked for but cannot be driven here, and why.
     """
 
     schema: int
@@ -79,6 +82,8 @@ class Results:
     standings: tuple[Standing, ...]
     failures: tuple[Failure, ...]
     criteria: Criteria
+    shares: dict[str, dict[str, Share]] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -87,11 +92,13 @@ class Results:
         failures: list[Failure],
         provenance: Provenance,
         criteria: Criteria | None = None,
+        left_out: Mapping[str, str] | None = None,
     ) -> Results:
         """Judge the metrics and put everything together."""
+        criteria = criteria or Criteria()
         finished = {name: drives for name, drives in maneuvers.items() if drives}
         verdicts = [judge(name, drives) for name, drives in finished.items()]
-        overall, standings = judge_suite(finished)
+        overall, standings = judge_suite(finished, criteria.references)
         if overall is not None:
             verdicts.append(overall)
         return cls(
@@ -101,7 +108,9 @@ class Results:
             verdicts=tuple(verdicts),
             standings=tuple(standings),
             failures=tuple(failures),
-            criteria=criteria or Criteria(),
+            criteria=criteria,
+            shares={name: shares_of(drives, criteria) for name, drives in finished.items()},
+            left_out=dict(left_out or {}),
         )
 
     @property
@@ -139,17 +148,24 @@ class Results:
     def save_csv(self, path: str | Path) -> None:
         """Write ``results.csv``: one row a drive, one column a metric, nothing where undefined."""
         rows = [
-            {"maneuver": maneuver, "policy": policy} | dict(_flat(to_dict(metrics)))
+            {"maneuver": maneuver, "policy": policy}
+            | dict(_flat(to_dict(metrics)))
+            | self._share_columns(maneuver, policy)
             for maneuver, drives in self.maneuvers.items()
             for policy, metrics in drives.items()
         ]
-        buffer = io.StringIO()
-        writer = csv.DictWriter(
-            buffer, list(rows[0]) if rows else ["maneuver", "policy"], lineterminator="\n"
-        )
-        writer.writeheader()
-        writer.writerows(rows)
-        write_text(path, buffer.getvalue())
+        save_rows(rows, path, None if rows else ("maneuver", "policy"))
+
+    def _share_columns(self, maneuver: str, policy: str) -> dict[str, float | None]:
+        share = self.shares.get(maneuver, {}).get(policy, Share())
+        return {"share": share.cue_error, "perceived_share": share.perceived_cue_error}
+
+
+def shares_of(drives: Mapping[str, Metrics], criteria: Criteria) -> dict[str, Share]:
+    """Share of the gap of each policy on one maneuver."""
+    errors = {name: metrics.cue_error for name, metrics in drives.items()}
+    perceived = {name: metrics.perceived_cue_error for name, metrics in drives.items()}
+    return shares(errors, perceived, criteria.references)
 
 
 def _flat(values: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError, UnknownNameError
 from ..envs.settings import load
+from .ladder import ALL_RUNGS, ladder_names
 from .suite import CueSource, labels
 
 if TYPE_CHECKING:
@@ -44,12 +45,16 @@ def find_car(name: str) -> Car:
 
 
 def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
-    """Label and name (or file) of each policy; those meant for a machine where none is named."""
+    """Label and name (or file) of each policy; those meant for a machine where none is named.
+
+    `ladder` stands for its policies.
+    """
     from .policies import default_policies, policy_names
 
     known = policy_names()
-    wanted = list(names) or default_policies(platform)
-    found = labels(wanted, [_label("policy", name, known) for name in wanted])
+    asked = list(names) or default_policies(platform)
+    wanted = [name for given in asked for name in (ladder_names(known) if given == ALL_RUNGS else [given])]
+    found = labels(wanted, [_label("policy", name, [*known, ALL_RUNGS]) for name in wanted])
     return {label: name for name, label in found.items()}
 
 

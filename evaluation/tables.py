@@ -2,62 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from .metrics import CUE_AXES, Metrics
 from .results import Results
+from .share import Share
+from .text_table import NOTHING, TextTable, degrees, fraction, microseconds, number, percent, print_table
 
-NOTHING: Final = "–"
-"""Shown where a metric is undefined."""
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table of text.
-
-    Args:
-        title: Above it.
-        header: Names of the columns; the first holds names, the others numbers.
-        rows: Cells.
-        best: Indices of the rows to stress.
-    """
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    best: tuple[int, ...] = ()
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A number with significant digits."""
-    if value is None:
-        return NOTHING
-    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
-        decimals = digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)
-        return f"{value:.{max(0, min(decimals, digits))}f}"
-    return f"{value:.{digits - 1}e}"
-
-
-def percent(share: float | None) -> str:
-    """A share in percent."""
-    return NOTHING if share is None else f"{100.0 * share:.1f}"
-
-
-def degrees(value: float | None) -> str:
-    """An angle or rate in degrees."""
-    return NOTHING if value is None else f"{math.degrees(value):.2f}"
-
-
-def microseconds(value: float | None) -> str:
-    """A time in microseconds."""
-    return NOTHING if value is None else f"{1e6 * value:.0f}"
+SHARE_HEADER: Final = ("share of the gap", "perceived share")
+"""Columns of :func:`share_cells`."""
 
 
 def largest_stroke(metrics: Metrics) -> tuple[str, float | None]:
@@ -71,12 +28,32 @@ def largest_stroke(metrics: Metrics) -> tuple[str, float | None]:
     return name, shares[name]
 
 
-def maneuver_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
-    """The headline metrics of each policy on one maneuver, best first."""
+def share_cells(share: Share) -> tuple[str, str]:
+    """Cells under :data:`SHARE_HEADER`."""
+    return fraction(share.cue_error), fraction(share.perceived_cue_error)
+
+
+def has_shares(shares: Iterable[Share]) -> bool:
+    """Whether any share is defined: both references are among the policies."""
+    return any(share != Share() for share in shares)
+
+
+def maneuver_table(
+    maneuver: str, drives: Mapping[str, Metrics], shares: Mapping[str, Share] | None = None
+) -> TextTable:
+    """The headline metrics of each policy on one maneuver, best first.
+
+    Args:
+        maneuver: For the title.
+        drives: Metrics by policy.
+        shares: Share of the gap by policy; its columns are left out where none is defined.
+    """
+    shown = shares if shares and has_shares(shares.values()) else None
     header = (
         "policy",
         "J",
         "perceived J",
+        *(SHARE_HEADER if shown else ()),
         "worst axis",
         "false cues %",
         "missing %",
@@ -87,16 +64,18 @@ def maneuver_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
         "step µs",
     )
     order = sorted(drives, key=lambda name: drives[name].cue_error)
-    return TextTable(maneuver, header, tuple(_headline(name, drives[name]) for name in order), (0,))
+    rows = (_headline(name, drives[name], share_cells(shown[name]) if shown else ()) for name in order)
+    return TextTable(maneuver, header, tuple(rows), (0,))
 
 
-def _headline(name: str, m: Metrics) -> tuple[str, ...]:
+def _headline(name: str, m: Metrics, shares: tuple[str, ...]) -> tuple[str, ...]:
     actuator, share = largest_stroke(m)
     part = m.axes[m.worst_axis].cue_error / m.cue_error if m.cue_error > 0.0 else None
     return (
         name,
         number(m.cue_error),
         number(m.perceived_cue_error),
+        *shares,
         NOTHING if part is None else f"{m.worst_axis} ({part:.0%})",
         percent(m.false_cues),
         percent(m.missing_cues),
@@ -167,41 +146,48 @@ def matrix_table(results: Results) -> TextTable:
     return TextTable("J by maneuver", ("maneuver", *policies), tuple(rows))
 
 
+def share_table(results: Results) -> TextTable:
+    """Share of the gap by maneuver and policy; without rows where no share is defined."""
+    policies = results.policies
+    rows = [
+        (maneuver, *(fraction(shares[name].cue_error if name in shares else None) for name in policies))
+        for maneuver, shares in results.shares.items()
+        if has_shares(shares.values())
+    ]
+    return TextTable("Share of the gap by maneuver", ("maneuver", *policies), tuple(rows))
+
+
 def standings_table(results: Results) -> TextTable:
     """The policies over the suite, best first."""
+    gaps = {s.policy: Share(s.share, s.perceived_share) for s in results.standings}
+    shown = has_shares(gaps.values())
     rows = [
         (
             s.policy,
             number(s.cue_error),
             number(s.perceived_cue_error),
+            *(share_cells(gaps[s.policy]) if shown else ()),
             f"{s.wins} of {s.maneuvers}",
             s.worst_maneuver,
         )
         for s in results.standings
     ]
-    header = ("policy", "mean J", "mean perceived J", "best on", "worst maneuver")
+    shares = SHARE_HEADER if shown else ()
+    header = ("policy", "mean J", "mean perceived J", *shares, "best on", "worst maneuver")
     return TextTable("The whole suite", header, tuple(rows), (0,))
-
-
-def print_table(console: Console, table: TextTable) -> None:
-    """Show a table on a terminal."""
-    shown = Table(title=escape(table.title), title_justify="left", title_style="bold", header_style="dim")
-    for i, name in enumerate(table.header):
-        shown.add_column(escape(name), justify="left" if i == 0 else "right")
-    for i, row in enumerate(table.rows):
-        shown.add_row(*(escape(cell) for cell in row), style="bold" if i in table.best else "")
-    console.print(shown)
 
 
 def print_results(console: Console, results: Results) -> None:
     """Show a table a maneuver, the summary of the suite, the verdicts and the failures."""
     for maneuver, drives in results.maneuvers.items():
-        print_table(console, maneuver_table(maneuver, drives))
+        print_table(console, maneuver_table(maneuver, drives, results.shares.get(maneuver)))
     if results.standings:
         print_table(console, standings_table(results))
     for verdict in results.verdicts:
         name = "Over the whole suite" if verdict.maneuver == "all" else verdict.maneuver
         console.print(f"[bold]{escape(name)}[/bold]: {escape(' '.join(verdict.sentences))}", highlight=False)
+    for policy, reason in results.left_out.items():
+        console.print(f"[bold]left out[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
     for failure in results.failures:
         what = f"{failure.maneuver}, {failure.policy}" if failure.policy else failure.maneuver
         console.print(

@@ -12,7 +12,9 @@ from itertools import product
 from typing import Final, Literal
 
 from ..envs.settings import configuration
+from .criteria import References
 from .metrics import CUE_AXES, Metrics
+from .share import Share, shares
 
 Cause = Literal["false", "missing", "shape"]
 CAUSES: Final[tuple[Cause, ...]] = ("false", "missing", "shape")
@@ -98,6 +100,8 @@ class Standing:
         perceived_cue_error: Mean perceived J.
         wins: Maneuvers on which its J is lowest.
         worst_maneuver: Where its J is highest.
+        share: Of the gap between the references' means; None where one of them is missing.
+        perceived_share: The same of the perceived J.
     """
 
     policy: str
@@ -106,6 +110,8 @@ class Standing:
     perceived_cue_error: float
     wins: int
     worst_maneuver: str
+    share: float | None = None
+    perceived_share: float | None = None
 
 
 def terms(metrics: Metrics) -> Terms:
@@ -151,25 +157,39 @@ def judge(maneuver: str, policies: Mapping[str, Metrics]) -> Verdict:
     return _judge(maneuver, {name: terms(metrics) for name, metrics in policies.items()}, perceived)
 
 
-def judge_suite(maneuvers: Mapping[str, Mapping[str, Metrics]]) -> tuple[Verdict | None, list[Standing]]:
+def judge_suite(
+    maneuvers: Mapping[str, Mapping[str, Metrics]], references: References | None = None
+) -> tuple[Verdict | None, list[Standing]]:
     """The verdict on the mean J and each policy's standing, best first.
 
     Only maneuvers that every policy finished count, so that all means are over the same drives.
 
+    Args:
+        maneuvers: Metrics by maneuver and policy.
+        references: Policies between which the share of the gap is measured.
+
     Returns:
         None and an empty list where there is no such maneuver.
     """
-    names = sorted({policy for drives in maneuvers.values() for policy in drives})
-    common = {maneuver: drives for maneuver, drives in maneuvers.items() if set(drives) == set(names)}
-    if not names or not common:
+    common = common_drives(maneuvers)
+    if not common:
         return None, []
+    names = sorted(next(iter(common.values())))
     perceived = {
         name: _mean(drives[name].perceived_cue_error for drives in common.values()) for name in names
     }
     verdict = _judge("all", {name: _mean_terms(common, name) for name in names}, perceived)
     winners = [judge(maneuver, drives).best for maneuver, drives in common.items()]
-    standings = [_standing(name, common, winners.count(name)) for name in verdict.ranking]
+    errors = {name: _mean(drives[name].cue_error for drives in common.values()) for name in names}
+    gap = shares(errors, perceived, references or References())
+    standings = [_standing(name, common, winners.count(name), gap[name]) for name in verdict.ranking]
     return verdict, standings
+
+
+def common_drives(maneuvers: Mapping[str, Mapping[str, Metrics]]) -> dict[str, Mapping[str, Metrics]]:
+    """The maneuvers that every policy finished."""
+    names = {policy for drives in maneuvers.values() for policy in drives}
+    return {maneuver: drives for maneuver, drives in maneuvers.items() if drives and set(drives) == names}
 
 
 def _judge(maneuver: str, policies: Mapping[str, Terms], perceived: Mapping[str, float]) -> Verdict:
@@ -186,7 +206,7 @@ def _judge(maneuver: str, policies: Mapping[str, Terms], perceived: Mapping[str,
     )
 
 
-def _standing(name: str, drives: Mapping[str, Mapping[str, Metrics]], wins: int) -> Standing:
+def _standing(name: str, drives: Mapping[str, Mapping[str, Metrics]], wins: int, share: Share) -> Standing:
     return Standing(
         policy=name,
         maneuvers=len(drives),
@@ -194,6 +214,8 @@ def _standing(name: str, drives: Mapping[str, Mapping[str, Metrics]], wins: int)
         perceived_cue_error=_mean(policies[name].perceived_cue_error for policies in drives.values()),
         wins=wins,
         worst_maneuver=max(drives, key=lambda maneuver: drives[maneuver][name].cue_error),
+        share=share.cue_error,
+        perceived_share=share.perceived_cue_error,
     )
 
 

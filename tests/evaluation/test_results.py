@@ -15,7 +15,8 @@ from motion_cueing.evaluation.metrics import CUE_AXES, measure
 from motion_cueing.evaluation.provenance import plain, provenance
 from motion_cueing.evaluation.report import render
 from motion_cueing.evaluation.results import SCHEMA, Failure, Results
-from motion_cueing.evaluation.tables import maneuver_table, number
+from motion_cueing.evaluation.tables import maneuver_table
+from motion_cueing.evaluation.text_table import number
 
 from .synthetic import drive
 
@@ -51,6 +52,8 @@ def test_json_is_strict_and_documented(results, tmp_path):
         "standings",
         "failures",
         "criteria",
+        "shares",
+        "left_out",
     ]
     assert values["maneuvers"]["weave"]["no-motion"]["axes"]["f_y"]["correlation"] is None
     assert list(values["maneuvers"]["weave"]["washout"]["axes"]) == list(CUE_AXES)
