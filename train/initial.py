@@ -7,16 +7,25 @@ from .agent import Agent, Network
 from .config import TrainingConfig
 
 
+def initial_agent(config: TrainingConfig) -> Agent | None:
+    """The agent of ``config.initial``, or None where nothing is named.
+
+    Raises:
+        DataError: the file cannot be read.
+    """
+    return None if config.initial is None else Agent.load(config.initial)
+
+
 def initial_network(config: TrainingConfig) -> Network | None:
-    """The network of ``config.initial``, or None where nothing is named.
+    """Its network.
 
     Raises:
         DataError: the file cannot be read.
         ConfigurationError: that agent sees, does or drives something else.
     """
-    if config.initial is None:
+    agent = initial_agent(config)
+    if agent is None:
         return None
-    agent = Agent.load(config.initial)
     for name in ("platform", "observation", "action"):
         theirs, ours = getattr(agent.task, name), getattr(config.task, name)
         if theirs != ours:

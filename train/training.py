@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from ..baselines import ClassicalWashout
+from ..envs.settings import from_dict, to_dict
 from ..envs.task.library import platform_of
 from .agent import Agent, Record
 from .base_policy import DEFAULT, base_parameters
 from .config import Measure
+from .initial import initial_agent
 from .interrupt import Interrupt
 from .learner import Learner, StopTraining
 from .logs import TrainingLog
@@ -87,6 +89,8 @@ class Training:
         state = run.last_checkpoint()
         # A checkpoint goes before the agent that the training began with, which may be gone by now.
         config = run.config if state is None else replace(run.config, initial=None)
+        begun = initial_agent(config)
+        self._initial = None if begun is None else begun.record
         self.learner: Learner = make_learner(config)
         self.validation = Validation(run.config)
         self._clock, self._seen = _Clock(), -1
@@ -100,6 +104,8 @@ class Training:
         self._clock = _Clock(state["elapsed"])
         self._seen = self.status.steps = self.learner.steps
         self.status.best, self.status.reference = state["best"], state["reference"]
+        if state["initial"] is not None:
+            self._initial = from_dict(Record, state["initial"], "initial")
 
     def train(self) -> Outcome:
         """Train to the configuration's steps, or until Ctrl-C; nothing where that is done already."""
@@ -172,6 +178,7 @@ class Training:
             versions=session["versions"],
             created=session["begun"],
             validation=None if self.status.score is None else self.status.score.cue_error,
+            initial=self._initial,
         )
         name = f"{self.run.path.resolve().name}-{kind}"
         base = base_parameters(config.base, config.task)
@@ -184,6 +191,7 @@ class Training:
             "elapsed": self._clock.total,
             "best": self.status.best,
             "reference": self.status.reference,
+            "initial": None if self._initial is None else to_dict(self._initial),
         }
         return self.run.save_checkpoint(self.status.steps, state)
 

@@ -117,11 +117,14 @@ def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     assert np.array_equal(training.learner.network()(seen), network(seen))
     training.train()
     assert not np.array_equal(Agent.load(second.final_agent).network(seen), network(seen))
+    origin = Agent.load(first.final_agent).record
+    assert Agent.load(second.final_agent).record.initial == origin
     # What is resumed no longer needs the agent it began with.
     first.final_agent.unlink()
     longer = RunFolder.open(second.path)
     longer.extend(400)
     assert not Training(longer).train().interrupted
+    assert Agent.load(second.final_agent).record.initial == origin
 
 
 def test_only_the_latest_checkpoints_are_kept(tmp_path):

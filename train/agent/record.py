@@ -21,6 +21,7 @@ class Record:
         versions: Of this package and the libraries, by name.
         created: When, ISO 8601.
         validation: J on the validation drives; None where it was not measured.
+        initial: How the agent was made that the training began with; None where it began anew.
     """
 
     algo: str
@@ -32,3 +33,4 @@ class Record:
     versions: dict[str, str] = field(default_factory=dict)
     created: str = ""
     validation: NonNegative | None = None
+    initial: Record | None = None
