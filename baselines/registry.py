@@ -26,8 +26,34 @@ class Entry:
     make: Callable[[Platform], Policy | ForeknowingPolicy]
 
 
+def _mpc(name: str) -> Callable[[Platform], Policy | ForeknowingPolicy]:
+    def make(platform: Platform) -> Policy | ForeknowingPolicy:
+        from .mpc import load_mpc, make_mpc
+
+        return make_mpc(platform, load_mpc(name), name)
+
+    return make
+
+
+def _nmpc(name: str, preset: str) -> Callable[[Platform], Policy | ForeknowingPolicy]:
+    def make(platform: Platform) -> Policy | ForeknowingPolicy:
+        from .mpc import load_mpc
+        from .nmpc import NmpcParameters, make_nmpc
+
+        return make_nmpc(platform, NmpcParameters(load_mpc(preset)), name)
+
+    return make
+
+
 _ENTRIES: Final[Mapping[str, Entry]] = {
     NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
+    "mpc": Entry("predictive control that knows nothing of the drive ahead", _mpc("mpc")),
+    "mpc-preview": Entry("predictive control that sees 2 s of the drive ahead", _mpc("mpc-preview")),
+    "mpc-full": Entry("predictive control that knows the drive over its whole horizon", _mpc("mpc-full")),
+    "nmpc": Entry("nonlinear predictive control without preview", _nmpc("nmpc", "mpc")),
+    "nmpc-preview": Entry(
+        "nonlinear predictive control that sees 2 s of the drive ahead", _nmpc("nmpc-preview", "mpc-preview")
+    ),
 }
 """Policies by name, beside the washout's presets."""
 

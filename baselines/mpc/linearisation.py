@@ -21,6 +21,7 @@ from ...envs.platform import Platform
 from ...envs.simulator import N_AXES
 from ..symbolic import SymbolicMachine
 from ..symbolic.library import Expression, cs
+from .compiled import compiled
 from .parameters import Margins
 
 Floats = NDArray[np.float64]
@@ -52,14 +53,14 @@ class Linearised:
         platform: The machine.
         nodes: Their number, n.
         margins: Shares of the limits.
-        function: Makes a faster one of the CasADi function; None to evaluate it as it is.
+        compile: Whether to compile the function where that can be done.
 
     Attributes:
         lower: (k - 6,) least values of the limit rows.
         upper: (k - 6,) greatest.
     """
 
-    def __init__(self, platform: Platform, nodes: int, margins: Margins, function: Any = None) -> None:
+    def __init__(self, platform: Platform, nodes: int, margins: Margins, compile: bool = True) -> None:
         machine = SymbolicMachine(platform)
         q, v, a = (cs.SX.sym(name, N_AXES) for name in ("q", "v", "a"))
         limits, self.lower, self.upper = _limit_rows(machine, margins, q, v, a)
@@ -67,7 +68,7 @@ class Linearised:
         slopes = cs.jacobian(rows, cs.vertcat(q, v, a))
         outputs = [rows, cs.densify(cs.vec(slopes.T))]
         node = cs.Function("linearised", [q, v, a], outputs).map(nodes)
-        self._function = node if function is None else function(node)
+        self._function: Any = compiled(node) if compile else node
         self._inputs = [np.zeros((nodes, N_AXES)) for _ in range(3)]
         self._result = Linearisation(np.zeros((nodes, rows.numel())), np.zeros((nodes, *slopes.shape)))
         self._buffer, self._evaluate = self._function.buffer()

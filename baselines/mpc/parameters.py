@@ -51,7 +51,7 @@ class Weights:
     translation: AxisWeights = AxisWeights(0.1, 0.05, 0.01, 1.0, 1.0)
     tilt: AxisWeights = AxisWeights(0.2, 0.0, 0.01, 2.0, 2.0)
     yaw: AxisWeights = AxisWeights(2.0, 1.0, 0.1, 10.0, 10.0)
-    turntable: AxisWeights = AxisWeights(0.001, 0.0, 0.001, 0.01, 0.0)
+    turntable: AxisWeights = AxisWeights(0.01, 0.0, 0.05, 0.1, 0.0)
 
 
 @configuration
@@ -117,6 +117,8 @@ class MpcParameters:
         penalty: Price of a limit's violation by its whole range, per second; higher than any
             multiplier, so that limits hold wherever they can.
         rounds: Most times that limits are added to a problem until none is violated.
+        compile: Whether to compile the machine's derivatives where there is a C compiler: the same
+            numbers, sooner.
     """
 
     nodes: Annotated[tuple[float, ...], Field(min_length=2, max_length=100)] = _NODES
@@ -129,6 +131,7 @@ class MpcParameters:
     margins: Margins = Margins()
     penalty: Positive = 1e4
     rounds: Whole = 20
+    compile: bool = True
 
     def __post_init__(self) -> None:
         if self.nodes[0] < TIME_STEP or any(b <= a for a, b in zip(self.nodes, self.nodes[1:], strict=False)):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Final
 
 import numpy as np
 
 from ...envs.platform import Platform
 from .grid import make_grid
-from .linearisation import Floats, Linearised
+from .linearisation import Floats, Linearisation, Linearised
 from .parameters import MpcParameters
 from .perceived import Perception
 from .problem import Plan, Problem
@@ -24,6 +24,7 @@ class Planned:
         plan: At the nodes.
         active: Limits that hold, to begin the next search with.
         solved: Whether every program was solved.
+        converged: Whether the last program changed next to nothing, or there was to be but one.
         iterations: Programs solved.
         rounds: Duals solved in all of them.
         relaxed: Largest violation of a linearised limit in the last one, in shares of its range.
@@ -32,6 +33,7 @@ class Planned:
     plan: Plan
     active: Rows
     solved: bool
+    converged: bool
     iterations: int
     rounds: int
     relaxed: float
@@ -40,25 +42,22 @@ class Planned:
 class Planner:
     """Gauss-Newton sequential quadratic programming over the horizon.
 
+    A plan that is made of several programs is searched for along each one's change: half the change is
+    tried where the whole one costs more. A plan of one program takes its change as it is.
+
     Args:
         platform: The machine.
         parameters: Of the controller.
         iterations: Most programs a plan; 1 linearises once.
-        tolerance: A plan that changes no acceleration by more is the solution, m/s^2 and rad/s^2.
-        function: Makes a faster one of the CasADi function; None to evaluate it as it is.
+        tolerance: A program that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
     """
 
     def __init__(
-        self,
-        platform: Platform,
-        parameters: MpcParameters,
-        iterations: int = 1,
-        tolerance: float = 0.0,
-        function: Any = None,
+        self, platform: Platform, parameters: MpcParameters, iterations: int = 1, tolerance: float = 0.0
     ) -> None:
         self.grid = make_grid(parameters.nodes)
         self.perception = Perception(self.grid, parameters)
-        self._linearised = Linearised(platform, len(self.grid.times), parameters.margins, function)
+        self._linearised = Linearised(platform, len(self.grid.times), parameters.margins, parameters.compile)
         self._problem = Problem(platform, parameters, self.grid, self.perception.response)
         self._iterations, self._tolerance, self._rounds = iterations, tolerance, parameters.rounds
 
@@ -81,25 +80,62 @@ class Planner:
             active: Limits that may hold.
             sensed: (n, 6) what the sensors remember, see :meth:`.perceived.Perception.memory`.
         """
+        search = _Search(self._problem, self._linearised, wanted, sensed)
         plan = Plan(*self.grid.motion(position, rate, guess), guess)
-        count = rounds = 0
-        while True:
-            solution = self._improve(plan, wanted, active, sensed)
-            count, rounds, active = count + 1, rounds + solution.rounds, solution.active
-            plan = _sum(plan, solution.change)
-            largest = float(np.max(np.abs(solution.change.acceleration)))
-            if not solution.solved or count >= self._iterations or largest <= self._tolerance:
-                return Planned(plan, active, solution.solved, count, rounds, solution.relaxed)
-
-    def _improve(self, plan: Plan, wanted: Floats, active: Rows, sensed: Floats | None) -> Solution:
-        problem = self._problem
-        about = self._linearised(plan.position, plan.rate, plan.acceleration)
-        cost = problem.cost(plan, about, wanted, sensed)
-        bounds = problem.bounds(self._linearised.lower, self._linearised.upper, wanted)
-        return solve(problem, cost, about, bounds, active, self._rounds)
+        rounds = 0
+        for count in range(1, self._iterations + 1):
+            solution = search.program(plan, active, self._rounds)
+            rounds, active = rounds + solution.rounds, solution.active
+            if not solution.solved:
+                return Planned(plan, active, False, False, count, rounds, 0.0)
+            share = 1.0 if self._iterations == 1 else search.share(plan, solution.change)
+            plan = after(plan, solution.change, share)
+            largest = share * float(np.max(np.abs(solution.change.acceleration)))
+            if largest <= self._tolerance:
+                break
+        converged = self._iterations == 1 or largest <= self._tolerance
+        return Planned(plan, active, True, converged, count, rounds, solution.relaxed)
 
 
-def _sum(plan: Plan, change: Plan) -> Plan:
+class _Search:
+    """The programs of one plan."""
+
+    def __init__(
+        self, problem: Problem, linearised: Linearised, wanted: Floats, sensed: Floats | None
+    ) -> None:
+        self._problem, self._linearised, self._wanted, self._sensed = problem, linearised, wanted, sensed
+        self._bounds = problem.bounds(linearised.lower, linearised.upper, wanted)
+
+    def program(self, plan: Plan, active: Rows, rounds: int) -> Solution:
+        """Solve the program about a plan."""
+        about = self._about(plan)
+        cost = self._problem.cost(plan, about, self._wanted, self._sensed)
+        return solve(self._problem, cost, about, self._bounds, active, rounds)
+
+    def share(self, plan: Plan, change: Plan) -> float:
+        """The first of 1, 1/2, 1/4 ... of a change that lowers the cost; 0 if none does."""
+        before, share = self._merit(plan), 1.0
+        while share >= _LEAST_SHARE:
+            if self._merit(after(plan, change, share)) < before:
+                return share
+            share *= 0.5
+        return 0.0
+
+    def _merit(self, plan: Plan) -> float:
+        return self._problem.merit(plan, self._about(plan), self._wanted, self._sensed, self._bounds)
+
+    def _about(self, plan: Plan) -> Linearisation:
+        return self._linearised(plan.position, plan.rate, plan.acceleration)
+
+
+_LEAST_SHARE: Final = 1.0 / 16.0
+"""Of a change that is tried."""
+
+
+def after(plan: Plan, change: Plan, share: float = 1.0) -> Plan:
+    """A plan with a share of a change."""
     return Plan(
-        plan.position + change.position, plan.rate + change.rate, plan.acceleration + change.acceleration
+        plan.position + share * change.position,
+        plan.rate + share * change.rate,
+        plan.acceleration + share * change.acceleration,
     )

@@ -66,6 +66,7 @@ class Counts:
         failures: Plans that were not found; the machine braked.
         iterations: Programs solved for them.
         rounds: Duals solved for them.
+        unconverged: Plans still on the move after their last program, where there may be several.
         relaxed: Plans in which a linearised limit could not be kept.
     """
 
@@ -73,6 +74,7 @@ class Counts:
     failures: int = 0
     iterations: int = 0
     rounds: int = 0
+    unconverged: int = 0
     relaxed: int = 0
 
     def add(self, planned: Planned) -> None:
@@ -81,6 +83,7 @@ class Counts:
         self.failures += not planned.solved
         self.iterations += planned.iterations
         self.rounds += planned.rounds
+        self.unconverged += not planned.converged
         self.relaxed += planned.relaxed > _RELAXED
 
 

@@ -99,20 +99,32 @@ class Problem:
             wanted: (n, 6) the car's cues, SI.
             sensed: (n, 6) what the sensors' memory adds to the perceived error, in zones; None for none.
         """
-        error = about.values[:, :N_CUES] - wanted / cue_scales()
         slope = self.condensed(about.slopes[:, :N_CUES])
         if self._perceived is not None:
-            error = np.einsum("cji,ic->jc", self._perceived, error)
-            n, size = len(error), slope.shape[-1]
             slope = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
-            slope = np.ascontiguousarray(slope).reshape(n, N_CUES, size)
-        if sensed is not None:
-            error = error + sensed
-        residual = (self._scale * error).ravel()
+        residual = (self._scale * self._error(about, wanted, sensed)).ravel()
         jacobian = (self._scale[:, :, None] * slope).reshape(len(residual), -1)
         return Quadratic(
             self._regular + jacobian.T @ jacobian, self._motion_gradient(plan) + residual @ jacobian
         )
+
+    def merit(
+        self, plan: Plan, about: Linearisation, wanted: Floats, sensed: Floats | None, bounds: Bounds
+    ) -> float:
+        """What a plan costs exactly, with the price of every limit it exceeds; see :meth:`cost`."""
+        error = self._scale * self._error(about, wanted, sensed)
+        excess = np.maximum(np.maximum(about.values - bounds.upper, bounds.lower - about.values), 0.0)
+        hard, soft = np.isfinite(bounds.price), bounds.softness > 0.0
+        squares = np.sum(error**2) + np.sum(excess[soft] ** 2 / bounds.softness[soft])
+        priced = bounds.price[hard] @ excess[hard]
+        return float(0.5 * (squares + self._motion_cost(plan)) + priced)
+
+    def _error(self, about: Linearisation, wanted: Floats, sensed: Floats | None) -> Floats:
+        """(n, 6) error of the cues, or of what is sensed of them, in zones."""
+        error = about.values[:, :N_CUES] - wanted / cue_scales()
+        if self._perceived is not None:
+            error = np.einsum("cji,ic->jc", self._perceived, error)
+        return error if sensed is None else error + sensed
 
     def condensed(self, slopes: Floats) -> Floats:
         """(n, r, m) derivatives of rows by the unknowns, from those by their node's motion (n, r, 27)."""
@@ -164,11 +176,24 @@ class Problem:
             np.hstack([softness, np.zeros((n, len(lower)))]),
         )
 
+    def _motion_cost(self, plan: Plan) -> float:
+        weighted = self._weighted(plan)
+        return float(sum(np.sum(x[:, self.axes] * w) for x, w in zip(_parts(plan), weighted, strict=True)))
+
     def _motion_gradient(self, plan: Plan) -> Floats:
-        grid, terms = self.grid, self._motion
-        q, v, a = (x[:, self.axes].T[:, :, None] for x in (plan.position, plan.rate, plan.acceleration))
-        parts = grid.position.T @ (terms[:, 0] @ q) + grid.rate.T @ (terms[:, 1] @ v) + terms[:, 2] @ a
-        return np.asarray(parts[:, :, 0].T.ravel())
+        q, v, a = self._weighted(plan)
+        return np.asarray((self.grid.position.T @ q + self.grid.rate.T @ v + a).ravel())
+
+    def _weighted(self, plan: Plan) -> list[Floats]:
+        """Positions, rates and accelerations (n, k) times their weights."""
+        return [
+            (self._motion[:, i] @ x[:, self.axes].T[:, :, None])[:, :, 0].T
+            for i, x in enumerate(_parts(plan))
+        ]
+
+
+def _parts(plan: Plan) -> tuple[Floats, Floats, Floats]:
+    return plan.position, plan.rate, plan.acceleration
 
 
 def moving_axes(platform: Platform) -> NDArray[np.intp]:

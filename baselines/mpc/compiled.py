@@ -1,0 +1,74 @@
+"""CasADi functions as machine code, where a C compiler is at hand; kept for the next time.
+
+A library lies in the user's cache folder under a hash of its C source and of the compiler's command, so
+nothing stale is ever loaded. Without a compiler the function stays what it is: slower, and the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+from ...envs.storage import write_bytes
+from ..symbolic.library import cs
+
+_FLAGS: Final = ("-O2", "-fPIC", "-shared")
+"""No flag that would change arithmetic: results are those of the function not compiled, to the bit."""
+
+_COMPILERS: Final = ("cc", "gcc", "clang")
+
+_PATIENCE: Final = 300.0
+"""Longest time a compiler may take, s."""
+
+
+def cache_folder() -> Path:
+    """Where libraries are kept: ``MOTION_CUEING_CACHE``, or ``motion-cueing`` in the user's cache folder."""
+    chosen = os.environ.get("MOTION_CUEING_CACHE")
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "motion-cueing"
+
+
+def find_compiler() -> str | None:
+    """A C compiler: ``CC`` of the environment, else one on the path; None without one."""
+    names = [os.environ["CC"]] if os.environ.get("CC") else list(_COMPILERS)
+    return next((path for name in names if (path := shutil.which(name))), None)
+
+
+def compiled(function: Any) -> Any:
+    """The function as machine code, or as it is where that cannot be had.
+
+    Args:
+        function: A CasADi function.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        return function
+    generator = cs.CodeGenerator(f"{function.name()}.c")
+    generator.add(function)
+    source = generator.dump()
+    key = hashlib.sha256("\n".join((*_FLAGS, compiler, platform.platform(), source)).encode()).hexdigest()
+    library = cache_folder() / f"{function.name()}-{key}.so"
+    try:
+        if not library.exists():
+            write_bytes(library, _compile(compiler, source))
+        return cs.external(function.name(), str(library))
+    except (OSError, RuntimeError, subprocess.SubprocessError):
+        return function
+
+
+def _compile(compiler: str, source: str) -> bytes:
+    """The shared library of a C source."""
+    with tempfile.TemporaryDirectory() as folder:
+        code, library = Path(folder) / "function.c", Path(folder) / "function.so"
+        code.write_text(source, encoding="utf-8")
+        command = [compiler, *_FLAGS, "-o", str(library), str(code), "-lm"]
+        subprocess.run(command, check=True, capture_output=True, timeout=_PATIENCE)
+        return library.read_bytes()
