@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
@@ -45,6 +45,15 @@ def _nmpc(name: str, preset: str) -> Callable[[Platform], Policy | ForeknowingPo
     return make
 
 
+def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Policy | ForeknowingPolicy]:
+    def make(platform: Platform) -> Policy | ForeknowingPolicy:
+        from .optimum import Optimum, OptimumOptions
+
+        return Optimum(platform, OptimumOptions(objective=objective))
+
+    return make
+
+
 _ENTRIES: Final[Mapping[str, Entry]] = {
     NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
     "mpc": Entry("predictive control that knows nothing of the drive ahead", _mpc("mpc")),
@@ -54,6 +63,8 @@ _ENTRIES: Final[Mapping[str, Entry]] = {
     "nmpc-preview": Entry(
         "nonlinear predictive control that sees 2 s of the drive ahead", _nmpc("nmpc-preview", "mpc-preview")
     ),
+    "optimum": Entry("the least J there is: the whole drive known, its motion planned", _optimum("J")),
+    "optimum-perceived": Entry("the same for the least perceived J", _optimum("perceived")),
 }
 """Policies by name, beside the washout's presets."""
 

@@ -1,0 +1,147 @@
+"""The offline optimum as a policy: it is told the whole drive, and plays its plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...envs.cues import CueTrace
+from ...envs.errors import ConfigurationError
+from ...envs.observation import OBSERVATION_SIZE, read
+from ...envs.perception import VestibularModel, get_vestibular_model
+from ...envs.platform import Platform, get_platform
+from ...envs.simulator import N_AXES
+from .cache import find, keep, key_of
+from .options import OptimumOptions
+from .plan import Plan
+from .progress import SolveProgress
+from .windows import Planner
+
+_SAME: Final = 1e-9
+"""Largest difference of two poses taken for one, m and rad."""
+
+
+class Optimum:
+    """The best accelerations there are for a drive that is known from beginning to end.
+
+    Args:
+        platform: The machine; default: the paper's.
+        options: The problem.
+        vestibular: The driver's perception, for the objective "perceived"; default: Zacharias'.
+        cached: Whether plans are kept on disk and found again.
+    """
+
+    def __init__(
+        self,
+        platform: Platform | None = None,
+        options: OptimumOptions | None = None,
+        vestibular: VestibularModel | None = None,
+        cached: bool = True,
+    ) -> None:
+        self.platform = platform or get_platform("paper")
+        self.parameters = options or OptimumOptions()
+        self.vestibular = vestibular or get_vestibular_model("zacharias")
+        self.name = "optimum" if self.parameters.objective == "J" else "optimum-perceived"
+        self._cached = cached
+
+    def for_drive(self, cues: CueTrace) -> PlannedDrive:
+        """The policy for one drive: solved here, or found among the plans kept.
+
+        Args:
+            cues: The drive, at the time step of the rollout.
+
+        Raises:
+            ConfigurationError: the cues are no CueTrace.
+        """
+        if not isinstance(cues, CueTrace):
+            raise ConfigurationError(
+                f"cues must be a CueTrace, found {type(cues).__name__}; get_maneuver(name).drive()"
+            )
+        return PlannedDrive(self, cues)
+
+    def plan(self, cues: CueTrace, start: ArrayLike | None = None) -> Plan:
+        """The plan for a drive.
+
+        Args:
+            cues: The drive, at the machine's time step.
+            start: (9,) pose to begin at; default: neutral.
+
+        Raises:
+            DataError: the start lies outside the machine's travel.
+        """
+        pose = np.zeros(N_AXES) if start is None else np.array(start, dtype=np.float64)
+        key = key_of(self.platform, self.parameters, self.vestibular, cues, pose)
+        found = find(key, len(cues) - 1) if self._cached else None
+        if found is not None:
+            return found
+        with SolveProgress(f"{self.name}: {cues.name}") as progress:
+            planner = Planner(self.platform, self.parameters, self.vestibular, cues, pose, progress.tell)
+            plan = planner.plan()
+        if self._cached:
+            keep(key, plan)
+        return plan
+
+
+class PlannedDrive:
+    """Plays the plan for one drive. A machine that begins elsewhere than planned gets a plan of its own.
+
+    Args:
+        optimum: Makes plans.
+        cues: The drive.
+    """
+
+    def __init__(self, optimum: Optimum, cues: CueTrace) -> None:
+        self.name, self.parameters = optimum.name, optimum.parameters
+        self.plan = optimum.plan(cues)
+        self._optimum, self._cues = optimum, cues
+
+    @property
+    def notes(self) -> Mapping[str, str]:
+        """How the plan was found."""
+        return self.plan.account.notes()
+
+    def predict(
+        self,
+        observation: NDArray[Any],
+        state: Any = None,
+        episode_start: NDArray[Any] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float64], Any]:
+        """The next accelerations of the plan; none after its end.
+
+        Args:
+            observation: (1, OBSERVATION_SIZE) or (OBSERVATION_SIZE,); only the first one matters.
+            state: The number of steps done; None at first.
+            episode_start: (1,) whether the drive begins anew.
+            deterministic: No effect.
+
+        Raises:
+            ConfigurationError: the observation is not one row: a plan is for one machine.
+        """
+        rows = np.asarray(observation, dtype=np.float64)
+        if rows.size != OBSERVATION_SIZE:
+            raise ConfigurationError(
+                f"a plan is for one machine: the observation must have {OBSERVATION_SIZE} entries, found "
+                f"shape {rows.shape}"
+            )
+        begins = state is None or (episode_start is not None and bool(np.any(episode_start)))
+        step = 0 if begins else int(state)
+        if begins:
+            self._begin_at(pose_of(rows.reshape(-1)))
+        within = step < len(self.plan.accelerations)
+        answer = self.plan.accelerations[step] if within else np.zeros(N_AXES)
+        return answer.reshape((*rows.shape[:-1], N_AXES)).copy(), step + 1
+
+    def _begin_at(self, pose: NDArray[np.float64]) -> None:
+        if np.abs(pose - self.plan.start).max() > _SAME:
+            self.plan = self._optimum.plan(self._cues, pose)
+
+
+def pose_of(observation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(9,) positions in an observation, the turntable's angle within half a turn."""
+    sine, cosine = read(observation, "turntable")
+    parts = [read(observation, name) for name in ("carriage", "displacement", "beta")]
+    return np.concatenate([*parts, [np.arctan2(sine, cosine)]])

@@ -1,0 +1,186 @@
+"""The optimum of a window of a drive: what the car does and how the machine moves at its start, to a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...envs.perception import VestibularModel
+from ...envs.platform import Platform
+from ...envs.simulator import N_AXES
+from ..symbolic import SymbolicMachine
+from .blocks import Blocks, blocks_of
+from .interval import N_CUES, interval, mean_accelerations
+from .limits import axis_bounds, node_limits
+from .options import OptimumOptions
+from .perception import SensedError, sensed_error
+from .transcription import Transcription
+
+Floats = NDArray[np.float64]
+
+_LEG_ACCELERATIONS: Final = 6
+"""The last inequalities of a node: the only ones that its accelerations can still change at the start."""
+
+_ACCEPTABLE: Final = {
+    "acceptable_tol": 0.2,
+    "acceptable_iter": 5,
+    "acceptable_obj_change_tol": 1e-3,
+    "acceptable_constr_viol_tol": 1e-3,
+    "acceptable_dual_inf_tol": 0.5,
+    "acceptable_compl_inf_tol": 0.01,
+}
+"""IPOPT also stops where the cost has stood still to a thousandth, and limits are kept to a millimetre."""
+
+_CONVERGED: Final = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What IPOPT came to.
+
+    Args:
+        accelerations: (n, 9) of every time step of the window.
+        costs: (intervals,) sum of squared errors of the samples of each.
+        converged: Whether it is a minimum.
+        iterations: IPOPT's.
+        status: IPOPT's word for how it ended.
+    """
+
+    accelerations: Floats
+    costs: Floats
+    converged: bool
+    iterations: int
+    status: str
+
+
+@dataclass(frozen=True)
+class Start:
+    """The machine and its driver at the start of a window.
+
+    Args:
+        position: (9,) m and rad.
+        rate: (9,).
+        memory: (m,) states of the sensed error for the next sample, in indifference zones; empty for J.
+    """
+
+    position: Floats
+    rate: Floats
+    memory: Floats
+
+
+class Problem:
+    """Windows of drives on one machine.
+
+    Args:
+        platform: The machine.
+        options: What to minimise, and how.
+        vestibular: The driver's perception.
+        dt: Time step of the machine, s.
+        margin: Share of the limits of speed and acceleration to keep free.
+        tell: Called with IPOPT's iterations so far.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        options: OptimumOptions,
+        vestibular: VestibularModel,
+        dt: float,
+        margin: float,
+        tell: Callable[[int], None] | None = None,
+    ) -> None:
+        self.options, self.dt, self.margin = options, dt, margin
+        self._machine = SymbolicMachine(platform)
+        self._tell = tell
+        self.sensed: SensedError | None = None
+        if options.objective == "perceived":
+            self.sensed = sensed_error(vestibular, dt)
+        self._transcriptions: dict[int, Transcription] = {}
+
+    @cached_property
+    def _parts(self) -> tuple[Blocks, Floats, Floats]:
+        part = interval(self._machine, self.options, self.sensed, self.dt)
+        spacing = self.options.steps * self.dt
+        limits = node_limits(self._machine, part.q, part.v, part.a, spacing, self.margin)
+        return blocks_of(part, limits, self.options), limits.lower, limits.upper
+
+    def solve(self, wanted: Floats, start: Start) -> Solution:
+        """The best accelerations for a window.
+
+        Args:
+            wanted: (n, 6) force and rate of the car at the n samples after the start.
+            start: Where the window begins.
+        """
+        count = -(-len(wanted) // self.options.steps)
+        given = self._given(wanted, count)
+        program = self._transcription(count)
+        result = program.solver(
+            x0=self._guess(count, start),
+            p=given,
+            **dict(zip(("lbx", "ubx"), self._bounds(count, start), strict=True)),
+            **dict(zip(("lbg", "ubg"), self._ranges(program), strict=True)),
+        )
+        stats = program.solver.stats()
+        x = np.array(result["x"])[:, 0]
+        nodes = x.reshape(count + 1, -1)
+        return Solution(
+            mean_accelerations(nodes[:, -N_AXES:], self.options.steps)[: len(wanted)],
+            program.shares(x, given)[0] * self.options.steps,
+            stats["return_status"] in _CONVERGED,
+            int(stats["iter_count"]),
+            str(stats["return_status"]),
+        )
+
+    def _transcription(self, count: int) -> Transcription:
+        if count not in self._transcriptions:
+            self._transcriptions[count] = Transcription(self._parts[0], count, self._ipopt(), self._tell)
+        return self._transcriptions[count]
+
+    def _ipopt(self) -> dict[str, Any]:
+        options = self.options
+        return {
+            "tol": options.tolerance,
+            "max_iter": options.iterations,
+            "mu_init": max(10.0 * options.barrier, 1e-2),
+            "mu_target": options.barrier,
+            "linear_solver": "mumps",
+            **_ACCEPTABLE,
+        }
+
+    def _given(self, wanted: Floats, count: int) -> Floats:
+        """The car's cues at all samples, and whether they count; what is after the end does not."""
+        rows = np.zeros((count * self.options.steps, N_CUES + 1))
+        rows[: len(wanted), :N_CUES] = wanted
+        rows[: len(wanted), N_CUES] = 1.0
+        return rows.ravel()
+
+    def _guess(self, count: int, start: Start) -> Floats:
+        """Standing still."""
+        nodes = np.zeros((count + 1, self._parts[0].node_size))
+        nodes[:, :N_AXES] = start.position
+        return nodes.ravel()
+
+    def _bounds(self, count: int, start: Start) -> tuple[Floats, Floats]:
+        """Of the variables: the start is given, carriage and turntable have limits of their own."""
+        most = np.full((count + 1, self._parts[0].node_size), np.inf)
+        speed, acceleration = axis_bounds(self._machine, self.margin)
+        most[:, N_AXES : 2 * N_AXES] = speed
+        most[:, -N_AXES:] = acceleration
+        lower, upper = -most, most
+        state = np.concatenate([start.position, start.rate, start.memory])
+        lower[0, : len(state)] = upper[0, : len(state)] = state
+        return lower.ravel(), upper.ravel()
+
+    def _ranges(self, program: Transcription) -> tuple[Floats, Floats]:
+        """Of the constraints: no gaps, and the limits."""
+        ranges = []
+        for limit in self._parts[1:]:
+            nodes = np.tile(limit, (program.intervals + 1, 1))
+            nodes[0, :-_LEG_ACCELERATIONS] = np.sign(limit[-1]) * np.inf
+            ranges.append(np.concatenate([np.zeros(program.gaps), nodes.ravel()]))
+        return ranges[0], ranges[1]
