@@ -61,13 +61,17 @@ class Forecast:
     Args:
         preview: How much of the drive ahead is known, s: 0 for nothing but now. What lies beyond the
             horizon is never looked at.
-        force_decay: Time constant with which the last known specific force goes to that of rest, s.
-        rate_decay: The same of the last known angular velocity.
+        memory: Time constant of the low-pass that tells what lasts from what is new, s.
+        force_decay: Time constants with which new specific force on x, y and z goes to what lasts, s.
+        rate_decay: The same of angular velocity.
+        lasting_decay: Time constant with which what lasts goes to rest, s.
     """
 
     preview: NonNegative = 0.0
-    force_decay: Positive = 3.0
+    memory: Positive = 2.0
+    force_decay: tuple[Positive, Positive, Positive] = (2.0, 0.7, 0.7)
     rate_decay: Positive = 1.5
+    lasting_decay: Positive = 10.0
 
 
 @configuration

@@ -44,6 +44,7 @@ class Memory:
         solved: Whether there is a plan.
         active: Limits that held in it.
         error: (6,) of the cues in the last step.
+        lasts: (6,) what of the car's cues lasts; None at the start.
         sensors: (6, 3) states of the vestibular filters.
     """
 
@@ -54,6 +55,7 @@ class Memory:
     solved: bool
     active: Rows
     error: Floats
+    lasts: Floats | None
     sensors: Floats
 
 
@@ -148,9 +150,10 @@ class PredictiveController:
         memory = self._begun() if memory is None else memory
         moment = _moment(row, memory.angle)
         sensors = self._planner.perception.advance(memory.sensors, memory.error, moment.error)
-        memory = replace(memory, angle=moment.position[8], sensors=sensors, error=moment.error)
+        lasts = self._forecast.remember(memory.lasts, moment.wanted)
+        memory = replace(memory, angle=moment.position[8], sensors=sensors, error=moment.error, lasts=lasts)
         if memory.age >= self._mpc.every or not memory.solved:
-            memory = self._plan(moment, memory)
+            memory = self._plan(moment, memory, lasts)
         action = self._action(moment, memory)
         return action, replace(memory, sample=memory.sample + 1, age=memory.age + 1)
 
@@ -164,15 +167,16 @@ class PredictiveController:
             solved=False,
             active=np.zeros(0, dtype=np.intp),
             error=np.zeros(6),
+            lasts=None,
             sensors=self._planner.perception.start(),
         )
 
-    def _plan(self, moment: Moment, memory: Memory) -> Memory:
+    def _plan(self, moment: Moment, memory: Memory, lasts: Floats) -> Memory:
         grid = self._planner.grid
         planned = self._planner(
             moment.position,
             moment.rate,
-            self._forecast(moment.wanted, memory.sample),
+            self._forecast(moment.wanted, lasts, memory.sample),
             grid.at(memory.plan, grid.times + TIME_STEP * memory.age),
             memory.active,
             self._planner.perception.memory(memory.sensors, moment.error),

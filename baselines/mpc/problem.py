@@ -71,6 +71,7 @@ class Problem:
     Attributes:
         axes: Axes that move, in the order of ``AXES``.
         size: Number of unknowns.
+        motion_weights: (k, 3, n, n) on positions, rates and accelerations at the nodes, by moving axis.
     """
 
     def __init__(
@@ -81,9 +82,9 @@ class Problem:
         n, k = len(grid.times), len(self.axes)
         self.size = n * k
         weights = [_axis_weights(platform, parameters)[axis] for axis in self.axes]
-        self._motion = np.array([_motion_terms(grid, w) for w in weights])  # (k, 3, n, n)
+        self.motion_weights = np.array([_motion_terms(grid, w) for w in weights])
         hessian = np.zeros((n, k, n, k))
-        for i, (position, rate, acceleration) in enumerate(self._motion):
+        for i, (position, rate, acceleration) in enumerate(self.motion_weights):
             hessian[:, i, :, i] = (
                 grid.position.T @ position @ grid.position + grid.rate.T @ rate @ grid.rate + acceleration
             )
@@ -187,7 +188,7 @@ class Problem:
     def _weighted(self, plan: Plan) -> list[Floats]:
         """Positions, rates and accelerations (n, k) times their weights."""
         return [
-            (self._motion[:, i] @ x[:, self.axes].T[:, :, None])[:, :, 0].T
+            (self.motion_weights[:, i] @ x[:, self.axes].T[:, :, None])[:, :, 0].T
             for i, x in enumerate(_parts(plan))
         ]
 
