@@ -9,8 +9,8 @@ from typing import Final, Literal
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
+from .families import family_presets, load_parameters, make_washout
 from .policy import ForeknowingPolicy, NoMotion, Policy
-from .washout import ClassicalWashout, load_washout, washout_presets
 
 
 @dataclass(frozen=True)
@@ -66,14 +66,14 @@ _ENTRIES: Final[Mapping[str, Entry]] = {
     "optimum": Entry("the least J there is: the whole drive known, its motion planned", _optimum("J")),
     "optimum-perceived": Entry("the same for the least perceived J", _optimum("perceived")),
 }
-"""Policies by name, beside the washout's presets."""
+"""Policies by name, beside the presets of the washouts."""
 
 _DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
 
 def policy_names() -> list[str]:
     """Names :func:`make_policy` knows."""
-    return [*_ENTRIES, *washout_presets()]
+    return [*_ENTRIES, *family_presets()]
 
 
 def default_policies() -> list[str]:
@@ -85,7 +85,7 @@ def describe_policy(name: str) -> str:
     """One line about a policy."""
     if name in _ENTRIES:
         return _ENTRIES[name].description
-    return load_washout(name).description
+    return load_parameters(name).description
 
 
 def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
@@ -99,9 +99,9 @@ def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPol
     if str(name) in _ENTRIES:
         return _ENTRIES[str(name)].make(platform)
     if Path(name).suffix in (".yaml", ".yml"):
-        return ClassicalWashout(load_washout(name), platform.cab)
-    if str(name) in washout_presets():
-        return ClassicalWashout(str(name), platform.cab)
+        return make_washout(load_parameters(name), platform.cab)
+    if str(name) in family_presets():
+        return make_washout(load_parameters(str(name)), platform.cab)
     if Path(name).exists():
         raise DataError(f"{name}: not a policy; expected a washout's .yaml file")
     raise UnknownNameError("policy", str(name), policy_names())

@@ -20,16 +20,16 @@ from .selection import find_car, find_maneuvers, find_platform
 from .tune_progress import TuningProgress
 
 if TYPE_CHECKING:
+    from ..baselines.families import AnyWashout
     from ..baselines.tuning.objective import Objective
     from ..baselines.tuning.options import TuningOptions
     from ..baselines.tuning.search import Record, Search
-    from ..baselines.washout import WashoutParameters
     from ..envs.car import Car
 
 _SUCCESS: Final = 0
 _INTERRUPTED: Final = 130
-_ALGORITHMS: Final = {"classical": "the classical washout"}
-"""What can be tuned; the start of a search is the preset of this name."""
+_ALGORITHMS: Final = {"classical": "classical", "adaptive": "adaptive", "optimal": "optimal-washout"}
+"""What can be tuned, and the preset a search begins with."""
 
 _TRACK: Final = "random track drive"
 """Source of a random drive on a handling track."""
@@ -48,7 +48,7 @@ class TuneCommand:
     objective: Literal["J", "perceived"] = "J"
     """What to minimise: J, or J of what the driver senses."""
     method: Literal["cma", "gradient"] = "cma"
-    """Search with CMA-ES, or along the gradient of J through the machine's equations."""
+    """Search with CMA-ES, or, classical only, along the gradient of J through the machine's equations."""
     maneuvers: Annotated[tuple[str, ...], arg(metavar="train|NAME|FILE ...")] = ("train",)
     """Random drives, or maneuvers and recordings by name or cue CSV file."""
     limits: Literal["roads", "all"] = "roads"
@@ -60,16 +60,17 @@ class TuneCommand:
     seed: int | None = None
     """Of everything that the search draws; default: 0."""
     start: Annotated[str | None, arg(metavar="NAME|FILE")] = None
-    """Washout to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it.
-    Default: classical."""
+    """Set to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it.
+    Default: the set of the algorithm that is set by hand."""
     platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
     """Motion base, by name or YAML file."""
     car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
     """Car that drives named maneuvers, by name or YAML file."""
     threads: int = 1
     """Cores to use."""
-    out: Annotated[Path, arg(metavar="FILE.yaml")] = Path("classical-tuned.yaml")
-    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json."""
+    out: Annotated[Path | None, arg(metavar="FILE.yaml")] = None
+    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json.
+    Default: classical-tuned.yaml, adaptive-tuned.yaml or optimal-washout-tuned.yaml."""
     resume: Annotated[bool, FlagCreatePairsOff] = False
     """Go on with the search kept beside --out; --budget may extend it."""
 
@@ -80,6 +81,8 @@ def run(command: TuneCommand) -> int:
     Raises:
         MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
     """
+    look_up("algorithm", command.algorithm, _ALGORITHMS)
+    command = replace(command, out=_out(command))
     _check(command)
     record = _record(command)
     search = _search(command, record)
@@ -89,7 +92,7 @@ def run(command: TuneCommand) -> int:
     _write(command, search)
     status = search.status
     if stopped:
-        on = f"motion-cueing tune {command.algorithm} --out {command.out} --resume"
+        on = f"motion-cueing tune {command.algorithm} --out {_out(command)} --resume"
         print(f"stopped after {status.hours:.0f} h; go on with: {on}", file=sys.stderr)
         return _INTERRUPTED
     if status.hours < search.options.budget:
@@ -97,9 +100,12 @@ def run(command: TuneCommand) -> int:
     return _SUCCESS
 
 
+def _out(command: TuneCommand) -> Path:
+    return command.out or Path(f"{_ALGORITHMS[command.algorithm]}-tuned.yaml")
+
+
 def _check(command: TuneCommand) -> None:
-    look_up("algorithm", command.algorithm, _ALGORITHMS)
-    if command.out.suffix not in (".yaml", ".yml"):
+    if _out(command).suffix not in (".yaml", ".yml"):
         raise ConfigurationError(f"--out {command.out}: a policy's file ends in .yaml")
     if command.threads < 1:
         raise ConfigurationError(f"--threads must be at least 1, found {command.threads}")
@@ -118,8 +124,18 @@ def _check_resumed(command: TuneCommand) -> None:
             raise ConfigurationError(f"--{name} was chosen when the search was begun; leave it out")
 
 
+def _check_algorithm(command: TuneCommand, record: Record) -> None:
+    from ..baselines.families import algorithm_of
+
+    begun = algorithm_of(record.options.start)
+    if begun != command.algorithm:
+        raise ConfigurationError(
+            f"{_kept(command)} is a search of {begun}; go on with: motion-cueing tune {begun}"
+        )
+
+
 def _kept(command: TuneCommand) -> Path:
-    return command.out.with_suffix(".search.json")
+    return _out(command).with_suffix(".search.json")
 
 
 def _record(command: TuneCommand) -> Record:
@@ -128,18 +144,19 @@ def _record(command: TuneCommand) -> Record:
 
     if command.resume:
         record = load_record(_kept(command))
+        _check_algorithm(command, record)
         budget = command.budget or record.options.budget
         return replace(record, options=replace(record.options, budget=budget))
     return Record(_options(command), command.platform, command.car, "", command=command_line())
 
 
 def _options(command: TuneCommand) -> TuningOptions:
+    from ..baselines.families import load_of
     from ..baselines.tuning.options import TuningOptions
-    from ..baselines.washout import load_washout
 
     given = {name: getattr(command, name) for name in ("drives", "budget", "seed")}
     return TuningOptions(
-        start=load_washout(command.start or command.algorithm),
+        start=load_of(command.algorithm, command.start or _ALGORITHMS[command.algorithm]),
         objective=command.objective,
         method=command.method,
         limits=command.limits,
@@ -191,7 +208,7 @@ def _write(command: TuneCommand, search: Search) -> None:
     options = search.options
     how = "CMA-ES" if options.method == "cma" else "gradient descent"
     goal = "J" if options.objective == "J" else "perceived J"
-    name, drives = command.out.stem, len(search.objective.drives)
+    name, drives = _out(command).stem, len(search.objective.drives)
     many = f"{drives} random drives" if options.maneuvers == ("train",) else ", ".join(options.maneuvers)
     tuned = search.result(name, f"{options.start.name} at its best: tuned by {how} for {goal} on {many}")
     notes = [
@@ -207,8 +224,8 @@ def _write(command: TuneCommand, search: Search) -> None:
     at_bounds = list(search.space.at_bounds(tuned))
     notes.append(f"at a bound of the search: {', '.join(at_bounds) or 'nothing'}")
     text = yaml.safe_dump(to_dict(tuned), sort_keys=False)
-    write_text(command.out, "".join(f"# {note}\n" for note in notes) + text)
-    print("\n".join([str(command.out), *(f"  {note}" for note in notes[3:])]))
+    write_text(_out(command), "".join(f"# {note}\n" for note in notes) + text)
+    print("\n".join([str(_out(command)), *(f"  {note}" for note in notes[3:])]))
 
 
 def _held_out(search: Search) -> Objective:
@@ -221,9 +238,7 @@ def _held_out(search: Search) -> Objective:
     return Objective(drives, given.platform, given.measure, given.threads, _spared(options, drives))
 
 
-def _scores(
-    where: str, objective: Objective, start: WashoutParameters, tuned: WashoutParameters
-) -> list[str]:
+def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
     found = objective.judge([start, tuned])
     return [
         f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "

@@ -14,6 +14,7 @@ import warp as wp
 from numpy.lib.recfunctions import structured_to_unstructured
 from numpy.typing import NDArray
 
+from ..washout import WashoutParameters
 from ..washout.batch import WashoutBatch
 from ..washout.classical import kernel_parameters
 from ..washout.structs import Parameters
@@ -142,7 +143,9 @@ def _kernel_slopes(space: WashoutSpace, place: Floats, objective: Objective) -> 
 
 
 def _kernel_values(space: WashoutSpace, place: Floats, objective: Objective) -> Floats:
-    parameters = kernel_parameters(space.decode(place), objective.platform.cab)
+    decoded = space.decode(place)
+    assert isinstance(decoded, WashoutParameters), "the options of a search refuse other families"
+    parameters = kernel_parameters(decoded, objective.platform.cab)
     values: Floats = _flat(wp.array([parameters], dtype=Parameters, device="cpu").numpy())[0]
     return values
 

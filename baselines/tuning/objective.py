@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
-from ..washout import WashoutParameters
+from ..families import AnyWashout, kernels_of
 from ..washout.batch import WashoutBatch
 
 Floats = NDArray[np.float64]
@@ -77,20 +77,20 @@ class Objective:
 
     def judge(
         self,
-        sets: Sequence[WashoutParameters],
+        sets: Sequence[AnyWashout],
         drives: Sequence[int] | None = None,
         guards: Sequence[int] = (),
     ) -> Judgement:
         """Every set through drives, in one launch.
 
         Args:
-            sets: Parameter sets.
+            sets: Parameter sets of one algorithm.
             drives: Which drives J is averaged over; default: all.
             guards: Further drives in which no limit may be met either.
         """
         counted = list(range(len(self.drives))) if drives is None else list(drives)
         driven = [*counted, *guards]
-        batch = WashoutBatch(sets, [self.drives[i] for i in driven], self.platform)
+        batch = WashoutBatch(sets, [self.drives[i] for i in driven], self.platform, kernels_of(sets[0]))
         scores = batch.scores(threads=self.threads)
         cue = scores.cue_error[:, : len(counted)].mean(axis=1)
         perceived = scores.perceived_error[:, : len(counted)].mean(axis=1)

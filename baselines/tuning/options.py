@@ -9,7 +9,7 @@ from pydantic import Field
 from ...envs.car import RandomDrives, drive_seeds
 from ...envs.errors import ConfigurationError
 from ...envs.settings import Positive, configuration
-from ..washout import WashoutParameters
+from ..families import AnyWashout, algorithm_of
 from .objective import Measure
 
 TRAIN: Final = "train"
@@ -32,7 +32,7 @@ class TuningOptions:
     Args:
         start: Where it begins, and what it leaves as it is: orders of filters, blocks that are off.
         objective: J, or J of what the driver senses.
-        method: "cma", or "gradient" through the machine's own equations.
+        method: "cma", or "gradient" through the machine's own equations, for a classical washout.
         maneuvers: "train" for random drives, or names of maneuvers and recordings.
         limits: Where no limit may be met: in "all" drives, or on "roads", which spares the random drives on a
             track; a set that takes the fiercest of them without a limit is a timid one on every road.
@@ -44,7 +44,7 @@ class TuningOptions:
         seed: Of everything else that is drawn.
     """
 
-    start: WashoutParameters
+    start: AnyWashout
     objective: Measure = "J"
     method: Literal["cma", "gradient"] = "cma"
     maneuvers: Annotated[tuple[str, ...], Field(min_length=1)] = (TRAIN,)
@@ -59,6 +59,8 @@ class TuningOptions:
     def __post_init__(self) -> None:
         if self.method == "gradient" and self.objective != "J":
             raise ConfigurationError("objective perceived has no gradient; use method cma")
+        if self.method == "gradient" and algorithm_of(self.start) != "classical":
+            raise ConfigurationError("only the classical washout has a gradient; use method cma")
         seen = drive_seeds(self.drives, self.drives_seed) if TRAIN in self.maneuvers else []
         if set(seen) & set(drive_seeds(HELD_OUT, HELD_OUT_SEED)):
             raise ConfigurationError(f"drives_seed {self.drives_seed} gives drives that are held out")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...envs.errors import DataError
 from ...envs.settings import configuration, from_dict, to_dict
 from ...envs.storage import write_text
-from ..washout import WashoutParameters
+from ..families import AnyWashout
 from .descent import Descent
 from .evolution import Evolution
 from .method import Found, Method
@@ -133,7 +133,7 @@ class Search:
     def _at_its_end(self) -> bool:
         return self.status.hours >= self.options.budget or self._method.converged
 
-    def result(self, name: str, description: str) -> WashoutParameters:
+    def result(self, name: str, description: str) -> AnyWashout:
         """The best set found, or the start before the first step."""
         best = self._method.best
         place = self.space.encode(self.options.start) if best is None else best[1]

@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.baselines.tuning import descent, evolution
+from motion_cueing.baselines.tuning.coordinates import Coordinate
 from motion_cueing.baselines.tuning.descent import Descent, place_gradient
 from motion_cueing.baselines.tuning.evolution import Evolution
 from motion_cueing.baselines.tuning.method import Found
 from motion_cueing.baselines.tuning.objective import LIMIT_STEP, Objective, penalty
 from motion_cueing.baselines.tuning.options import TuningOptions
 from motion_cueing.baselines.tuning.search import Record, Search, load_record
-from motion_cueing.baselines.tuning.space import Coordinate, WashoutSpace
+from motion_cueing.baselines.tuning.space import WashoutSpace
 from motion_cueing.baselines.washout import HighPass, load_washout, washout_presets
 from motion_cueing.envs.car import drive_seeds
 from motion_cueing.envs.errors import ConfigurationError, DataError

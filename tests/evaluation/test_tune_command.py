@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from motion_cueing.baselines import make_policy
+from motion_cueing.baselines.families import algorithm_of, load_parameters
 from motion_cueing.baselines.tuning.options import TuningOptions
 from motion_cueing.baselines.tuning.search import Status, load_record
 from motion_cueing.baselines.washout import load_washout
@@ -130,11 +131,45 @@ def test_wrong_arguments_are_named(more, told, tmp_path, monkeypatch, capsys):
 
 
 def test_unknown_algorithms_and_searches_that_are_there_already_are_refused(words, tmp_path, capsys):
-    assert main(["tune", "optimal"]) == 2
-    assert "unknown algorithm 'optimal'" in capsys.readouterr().err
+    assert main(["tune", "optimum"]) == 2
+    assert "unknown algorithm 'optimum'. Did you mean optimal?" in capsys.readouterr().err
     (tmp_path / "mine.search.json").write_text("{}")
     assert main(words) == 2
     assert "go on with --resume, or name another --out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("algorithm", "start"), [("adaptive", "adaptive"), ("optimal", "optimal-washout")])
+def test_every_family_is_tuned_the_same_way(algorithm, start, words, tmp_path, capsys):
+    words = ["tune", algorithm, *words[2:4], "--budget", str(15 * 6 * 2.0 / HOUR)]
+    assert main(words) == 0
+    found = load_parameters(tmp_path / f"{start}-tuned.yaml")
+    assert (algorithm_of(found), found.name) == (algorithm, f"{start}-tuned")
+    before, after = (float(cost) for cost in re.findall(r"J ([\d.]+), perceived", capsys.readouterr().out))
+    assert 0.0 < after < before
+    kept = load_record(tmp_path / f"{start}-tuned.search.json")
+    assert kept.options.start == load_parameters(start)
+    # It goes on as the search of that algorithm alone.
+    assert main(["tune", algorithm, "--resume"]) == 0
+    out = ["--out", f"{start}-tuned.yaml"]
+    assert main(["tune", "classical", "--resume", *out]) == 2
+    assert (
+        f"is a search of {algorithm}; go on with: motion-cueing tune {algorithm}" in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--method", "gradient"], "only the classical washout has a gradient; use method cma"),
+        (
+            ["--start", "classical"],
+            "a set of the classical washout; give one of the adaptive washout",
+        ),
+    ],
+)
+def test_what_only_another_family_has_is_refused(more, told, words, capsys):
+    assert main(["tune", "adaptive", *words[2:4], *more]) == 2
+    assert told in capsys.readouterr().err
 
 
 def test_progress_is_a_bar_on_a_terminal_and_some_lines_elsewhere():

@@ -1,0 +1,62 @@
+"""The adaptive washout as a policy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from ...envs.platform.machines import Cab
+from ...envs.precision import vec3
+from ...envs.simulator import TIME_STEP
+from ..washout.classical import kernel_parameters
+from ..washout.family import Family, make_family
+from ..washout.policy import WashoutPolicy
+from .parameters import AdaptiveParameters, load_adaptive
+from .step import AdaptiveKernelParameters, AdaptiveMemory, adaptive_washout, initial_adaptive_memory
+
+
+def _values(p: AdaptiveParameters, cab: Cab, dt: float) -> Any:
+    """The kernels' form of a parameter set."""
+    k: Any = AdaptiveKernelParameters()
+    k.washout = kernel_parameters(p, cab)
+    a = p.adaptation
+    for name in ("force", "rate", "force_departure", "rate_departure"):
+        setattr(k, name, getattr(a, name) ** -2)
+    for name in ("displacement", "velocity"):
+        horizontal, vertical = (scale**-2 for scale in getattr(a, name))
+        setattr(k, name, vec3(horizontal, horizontal, vertical))
+    k.angle = vec3(*(scale**-2 for scale in a.angle))
+    k.force_speed, k.rate_speed = vec3(*a.force_speed), vec3(*a.rate_speed)
+    k.gain_min, k.gain_max = a.gain_limits
+    return k
+
+
+ADAPTIVE: Final[Family] = make_family(
+    AdaptiveKernelParameters, AdaptiveMemory, initial_adaptive_memory, adaptive_washout, _values
+)
+"""The classical algorithm with adapted gains."""
+
+
+class AdaptiveWashout(WashoutPolicy):
+    """The adaptive washout as a policy; its memory, gains and all, is the policy's state.
+
+    Args:
+        parameters: A parameter set, a preset name or a YAML file.
+        cab: Where the driver sits on the machine.
+        dt: Time step, s.
+    """
+
+    def __init__(
+        self,
+        parameters: AdaptiveParameters | str | Path = "adaptive",
+        cab: Cab | None = None,
+        dt: float = TIME_STEP,
+    ) -> None:
+        if not isinstance(parameters, AdaptiveParameters):
+            parameters = load_adaptive(parameters)
+        self.parameters = parameters
+        super().__init__(ADAPTIVE, parameters, cab, dt)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made anew: Warp's arrays cannot be."""
+        return type(self), (self.parameters, self.cab, self.dt)

@@ -1,0 +1,143 @@
+"""The washouts by algorithm: parameter sets of any family by name or file, and their policies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final, TypeAlias
+
+from pydantic import Discriminator, Tag
+
+from ..envs.errors import ConfigurationError, UnknownNameError, look_up
+from ..envs.platform.machines import Cab
+from ..envs.settings import from_dict, read_yaml
+from .adaptive import AdaptiveParameters, AdaptiveWashout, adaptive_presets, load_adaptive
+from .adaptive.policy import ADAPTIVE
+from .optimal_washout import OptimalParameters, OptimalWashout, load_optimal, optimal_presets
+from .optimal_washout.policy import OPTIMAL
+from .policy import Policy
+from .washout import ClassicalWashout, WashoutParameters, load_washout, washout_presets
+from .washout.classical import CLASSICAL
+from .washout.family import Family
+
+
+def algorithm_of(parameters: Any) -> str:
+    """Name of the family that a parameter set, or the values of one in a file, belong to."""
+    if isinstance(parameters, dict):
+        return str(parameters.get("algorithm", "classical"))
+    return str(getattr(parameters, "algorithm", "classical"))
+
+
+AnyWashout: TypeAlias = Annotated[
+    Annotated[WashoutParameters, Tag("classical")]
+    | Annotated[AdaptiveParameters, Tag("adaptive")]
+    | Annotated[OptimalParameters, Tag("optimal")],
+    Discriminator(algorithm_of),
+]
+"""A parameter set of any family."""
+
+
+@dataclass(frozen=True)
+class Algorithm:
+    """One family, for people and searches.
+
+    Args:
+        description: What it is called in a sentence.
+        start: The preset that is set by hand.
+        parameters: Class of its parameter sets.
+        kernels: It as kernels.
+        presets: Names of its shipped sets.
+        load: A set by preset name.
+        make: The policy of a set on a machine.
+    """
+
+    description: str
+    start: str
+    parameters: type[Any]
+    kernels: Family
+    presets: Callable[[], list[str]]
+    load: Callable[[str], AnyWashout]
+    make: Callable[[Any, Cab], Policy]
+
+
+ALGORITHMS: Final[Mapping[str, Algorithm]] = {
+    "classical": Algorithm(
+        "the classical washout",
+        "classical",
+        WashoutParameters,
+        CLASSICAL,
+        washout_presets,
+        load_washout,
+        ClassicalWashout,
+    ),
+    "adaptive": Algorithm(
+        "the adaptive washout",
+        "adaptive",
+        AdaptiveParameters,
+        ADAPTIVE,
+        adaptive_presets,
+        load_adaptive,
+        AdaptiveWashout,
+    ),
+    "optimal": Algorithm(
+        "the optimal washout",
+        "optimal-washout",
+        OptimalParameters,
+        OPTIMAL,
+        optimal_presets,
+        load_optimal,
+        OptimalWashout,
+    ),
+}
+"""Every family by name."""
+
+
+def family_presets() -> list[str]:
+    """Names of the shipped sets of all families."""
+    return [name for algorithm in ALGORITHMS.values() for name in algorithm.presets()]
+
+
+def load_parameters(name: str | Path) -> AnyWashout:
+    """A parameter set of any family, by preset name or from a YAML file.
+
+    A file says by ``algorithm`` which family it is of; without, it is a classical one.
+
+    Raises:
+        UnknownNameError: no preset has this name, or no family the file's ``algorithm``.
+        DataError: the file cannot be read.
+        ConfigurationError: a field of it is wrong.
+    """
+    if Path(name).suffix in (".yaml", ".yml"):
+        values = read_yaml(name)
+        algorithm = look_up("algorithm", algorithm_of(values), ALGORITHMS)
+        return from_dict(algorithm.parameters, values, str(name))  # type: ignore[no-any-return]
+    for algorithm in ALGORITHMS.values():
+        if str(name) in algorithm.presets():
+            return algorithm.load(str(name))
+    raise UnknownNameError("washout preset", str(name), family_presets())
+
+
+def load_of(family: str, name: str | Path) -> AnyWashout:
+    """A parameter set of one family, by preset name or from a YAML file.
+
+    Raises:
+        ConfigurationError: it is of another family; otherwise as :func:`load_parameters`.
+    """
+    found = load_parameters(name)
+    if algorithm_of(found) != family:
+        raise ConfigurationError(
+            f"{name} is a set of {ALGORITHMS[algorithm_of(found)].description}; "
+            f"give one of {ALGORITHMS[family].description}"
+        )
+    return found
+
+
+def make_washout(parameters: AnyWashout, cab: Cab) -> Policy:
+    """The policy of a parameter set of any family, for a cab."""
+    return ALGORITHMS[algorithm_of(parameters)].make(parameters, cab)
+
+
+def kernels_of(parameters: AnyWashout) -> Family:
+    """The family of a parameter set as kernels."""
+    return ALGORITHMS[algorithm_of(parameters)].kernels

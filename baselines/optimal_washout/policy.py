@@ -1,0 +1,101 @@
+"""The optimal washout as a policy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from ...envs.platform.machines import Cab
+from ...envs.precision import mat22
+from ...envs.simulator import TIME_STEP
+from ..washout import HighPass, WashoutParameters
+from ..washout.classical import kernel_parameters
+from ..washout.family import Family, make_family
+from ..washout.policy import WashoutPolicy
+from .design import design, discrete
+from .parameters import OptimalParameters, load_optimal
+from .regulator import StateSpace
+from .step import (
+    Line,
+    OptimalKernelParameters,
+    OptimalMemory,
+    Plane,
+    initial_optimal_memory,
+    mat55,
+    mat1010,
+    optimal_washout,
+    vec5,
+    vec10,
+)
+
+
+def _frame(p: OptimalParameters, cab: Cab) -> Any:
+    """The classical washout around the filters: scales, limits and split."""
+    shared = ("force_scale", "force_limit", "rate_scale", "rate_limit", "turntable_share", "turntable_gain")
+    values = {name: getattr(p, name) for name in (*shared, "lpc", "follow_frequency")}
+    open_ = HighPass()
+    return kernel_parameters(
+        WashoutParameters(
+            p.name, hpr=(open_,) * 3, hps=(open_,) * 2, hpi=(open_,) * 3, tilt=None,
+            return_frequency=0.0, **values,
+        ),
+        cab,
+    )  # fmt: skip
+
+
+def _plane(s: StateSpace) -> Any:
+    k: Any = Plane()
+    k.a, k.d = mat1010(*s.a.ravel()), mat22(*s.d.ravel())
+    k.b_rate, k.b_force = vec10(*s.b[:, 0]), vec10(*s.b[:, 1])
+    k.c_tilt, k.c_move = vec10(*s.c[0]), vec10(*s.c[1])
+    return k
+
+
+def _line(s: StateSpace) -> Any:
+    k: Any = Line()
+    k.a, k.b, k.c, k.d = mat55(*s.a.ravel()), vec5(*s.b[:, 0]), vec5(*s.c[0]), float(s.d[0, 0])
+    return k
+
+
+def _values(p: OptimalParameters, cab: Cab, dt: float) -> Any:
+    """The kernels' form of a parameter set: here the filters are designed."""
+    solved = design(p)
+    k: Any = OptimalKernelParameters()
+    k.frame = _frame(p, cab)
+    k.surge, k.sway = (_plane(discrete(s.filter, dt)) for s in (solved.surge, solved.sway))
+    k.heave, k.yaw = (_line(discrete(s.filter, dt)) for s in (solved.heave, solved.yaw))
+    return k
+
+
+OPTIMAL: Final[Family] = make_family(
+    OptimalKernelParameters, OptimalMemory, initial_optimal_memory, optimal_washout, _values
+)
+"""Filters from the Riccati equation."""
+
+
+class OptimalWashout(WashoutPolicy):
+    """The optimal washout as a policy; its filters' memory is the policy's state.
+
+    Args:
+        parameters: A parameter set, a preset name or a YAML file.
+        cab: Where the driver sits on the machine.
+        dt: Time step, s.
+
+    Raises:
+        ConfigurationError: no filter is optimal for these weights in floating point.
+    """
+
+    def __init__(
+        self,
+        parameters: OptimalParameters | str | Path = "optimal-washout",
+        cab: Cab | None = None,
+        dt: float = TIME_STEP,
+    ) -> None:
+        if not isinstance(parameters, OptimalParameters):
+            parameters = load_optimal(parameters)
+        self.parameters = parameters
+        super().__init__(OPTIMAL, parameters, cab, dt)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made anew: Warp's arrays cannot be."""
+        return type(self), (self.parameters, self.cab, self.dt)
