@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
-from ...envs.storage import write_bytes
+from ...envs.storage import write_bytes, write_text
 from ..symbolic.library import cs
 
 _FLAGS: Final = ("-O2", "-fPIC", "-shared")
@@ -57,11 +57,25 @@ def compiled(function: Any) -> Any:
     key = hashlib.sha256("\n".join((*_FLAGS, compiler, platform.platform(), source)).encode()).hexdigest()
     library = cache_folder() / f"{function.name()}-{key}.so"
     try:
-        if not library.exists():
-            write_bytes(library, _compile(compiler, source))
+        if not _is_whole(library):
+            code = _compile(compiler, source)
+            write_bytes(library, code)
+            write_text(_seal(library), hashlib.sha256(code).hexdigest())
         return cs.external(function.name(), str(library))
     except (OSError, RuntimeError, subprocess.SubprocessError):
         return function
+
+
+def _seal(library: Path) -> Path:
+    """The file with the library's own hash."""
+    return library.with_suffix(".sha256")
+
+
+def _is_whole(library: Path) -> bool:
+    """Whether a library is there and undamaged: loading a torn one would end the process."""
+    if not (library.exists() and _seal(library).exists()):
+        return False
+    return hashlib.sha256(library.read_bytes()).hexdigest() == _seal(library).read_text(encoding="utf-8")
 
 
 def _compile(compiler: str, source: str) -> bytes:
