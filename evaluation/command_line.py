@@ -50,6 +50,9 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "export": Command(".export_command", "ExportCommand", "write an agent as an ONNX file"),
     "train": Command("..train.train_command", "TrainCommand", "train an agent on random drives"),
     "curves": Command(".curves_command", "CurvesCommand", "draw what trainings came to over their steps"),
+    "frequency-response": Command(
+        ".frequency_command", "FrequencyResponseCommand", "measure modulus and phase of what is felt"
+    ),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
 }
 

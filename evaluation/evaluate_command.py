@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -30,6 +30,7 @@ from .suite_progress import suite_progress
 from .tables import print_results
 from .text_table import print_table
 from .trajectory import Trajectory
+from .words import words_of
 
 if TYPE_CHECKING:
     from ..envs.car import Car
@@ -174,15 +175,7 @@ def _line_up(
 
 def command_line(command: EvaluateCommand) -> tuple[str, ...]:
     """The words that give this command: the options that differ from their default."""
-    words = ["motion-cueing", "evaluate"]
-    for option in fields(command):
-        value = getattr(command, option.name)
-        if value != option.default:
-            words += [
-                f"--{option.name}",
-                *([str(item) for item in value] if isinstance(value, tuple) else [str(value)]),
-            ]
-    return tuple(words)
+    return tuple(words_of("evaluate", command))
 
 
 def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:

@@ -1,0 +1,104 @@
+"""Frequency responses as tables, CSV and JSON."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ..envs.errors import DataError
+from ..envs.settings import from_dict, to_dict
+from ..envs.storage import write_text
+from .frequency_response import FrequencyResponse
+from .provenance import versions
+from .spreadsheet import save_rows
+from .text_table import TextTable, number
+
+SCHEMA: Final = 1
+"""Version of ``frequency-response.json``."""
+
+CROSSED: Final = (("f_x", "w_y"), ("f_y", "w_x"), ("w_y", "f_x"), ("w_x", "f_y"))
+"""Input and felt axis of the crossed responses that the test asks for: tilt coordination, and its reverse."""
+
+
+def response_table(response: FrequencyResponse) -> TextTable:
+    """Modulus and phase of each axis to itself and of the crossed responses, over frequency."""
+    pairs = [(axis, axis) for axis in response.inputs]
+    pairs += [pair for pair in CROSSED if pair[0] in response.inputs]
+    rows: list[tuple[str, ...]] = []
+    for moved, felt in pairs:
+        values = response.response(moved, felt)
+        name = moved if moved == felt else f"{moved} to {felt}"
+        modulus = np.abs(values) * factor(moved, felt)
+        rows.append((f"{name}, modulus{unit(moved, felt)}", *(number(value) for value in modulus)))
+        phases = np.degrees(np.angle(values))
+        rows.append((f"{name}, phase deg", *(f"{phase:.0f}" for phase in phases)))
+    header = ("rad/s", *(f"{frequency:.3g}" for frequency in response.test.frequencies))
+    title = f"{response.policy} on {response.platform}, {response.test.scale:g} of the test's amplitudes"
+    return TextTable(title, header, tuple(rows))
+
+
+def factor(moved: str, felt: str) -> float:
+    """From SI units to those a person reads: degrees."""
+    if moved[0] == felt[0]:
+        return 1.0
+    return float(np.degrees(1.0) if felt.startswith("w") else np.radians(1.0))
+
+
+def unit(moved: str, felt: str) -> str:
+    """Of the modulus, in brackets, where it has one."""
+    if moved[0] == felt[0]:
+        return ""
+    return " (deg/s)/(m/s²)" if felt.startswith("w") else " (m/s²)/(deg/s)"
+
+
+def _flat(response: FrequencyResponse) -> Iterator[Mapping[str, Any]]:
+    for sinusoid in response.sinusoids:
+        for felt, modulus in sinusoid.modulus.items():
+            yield {
+                "policy": response.policy,
+                "input": sinusoid.input,
+                "felt": felt,
+                "frequency_rad_s": sinusoid.frequency,
+                "amplitude": sinusoid.amplitude,
+                "modulus": modulus,
+                "phase_rad": sinusoid.phase[felt],
+                "explained": sinusoid.explained if felt == sinusoid.input else None,
+                "at_limit": sinusoid.at_limit,
+            }
+
+
+def save_csv(responses: Sequence[FrequencyResponse], path: Path) -> None:
+    """Write one row a policy, input axis, felt axis and frequency, in SI units."""
+    save_rows([row for response in responses for row in _flat(response)], path)
+
+
+def save_json(responses: Sequence[FrequencyResponse], arguments: Sequence[str], path: Path) -> None:
+    """Write everything, with the command line and the versions that made it."""
+    content = {
+        "schema": SCHEMA,
+        "command": shlex.join(arguments),
+        "versions": versions(),
+        "responses": [to_dict(response) for response in responses],
+    }
+    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def load_json(path: str | Path) -> list[FrequencyResponse]:
+    """Read what :func:`save_json` wrote.
+
+    Raises:
+        DataError: the file is missing, broken, or of another version.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise DataError(f"{path}: cannot be read as frequency responses ({error})") from None
+    found = content.get("schema") if isinstance(content, dict) else None
+    if found != SCHEMA:
+        raise DataError(f"{path}: frequency responses of version {found}, this package reads {SCHEMA}")
+    return [from_dict(FrequencyResponse, values, str(path)) for values in content["responses"]]
