@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
+from .ceiling import CeilingWashout
 from .families import family_presets, load_parameters, make_washout
 from .policy import ForeknowingPolicy, NoMotion, Policy
 
@@ -56,6 +57,9 @@ def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Polic
 
 _ENTRIES: Final[Mapping[str, Entry]] = {
     NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
+    CeilingWashout.name: Entry(
+        "classical with the best set for each standard maneuver: the washout's ceiling", CeilingWashout
+    ),
     "mpc": Entry("predictive control that knows nothing of the drive ahead", _mpc("mpc")),
     "mpc-preview": Entry("predictive control that sees 2 s of the drive ahead", _mpc("mpc-preview")),
     "mpc-full": Entry("predictive control that knows the drive over its whole horizon", _mpc("mpc-full")),
