@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from ...envs.platform import Platform
@@ -11,21 +13,27 @@ from ..symbolic.library import cs
 from .linearisation import Floats
 from .problem import moving_axes
 
+_ROUNDS: Final = 3
+"""Newton's steps to the platform's accelerations; each squares the error."""
+
+_SHARE: Final = 1.0 - 1e-6
+"""Of the acceleration limits, so that rounding does not exceed them."""
+
 
 class Brakes:
     """Accelerations that bring every actuator to rest by itself, as fast as its acceleration limit lets it.
 
-    So each leg stops where its own limits say it can; the platform's pose follows from the legs.
+    So each leg stops where its own limits say it can; the platform's accelerations are those that give
+    the legs their rates at the end of the step.
     """
 
     def __init__(self, platform: Platform) -> None:
         machine = SymbolicMachine(platform)
         q, v, a = (cs.SX.sym(name, N_AXES) for name in ("q", "v", "a"))
-        legs = machine.leg_motion(q, v, a)
-        slope = cs.jacobian(legs.acceleration, a[2:8])
-        drift = cs.substitute(legs.acceleration, a, cs.SX.zeros(N_AXES))
-        self._legs = cs.Function("legs", [q, v], [legs.rate, slope, drift])
-        self._limit = machine.limits["acceleration"]
+        after = machine.leg_rates(q + TIME_STEP * v + 0.5 * TIME_STEP**2 * a, v + TIME_STEP * a)
+        self._after = cs.Function("after", [q, v, a], [after, cs.jacobian(after, a[2:8])])
+        self._rates = machine.leg_rates
+        self._change = _SHARE * TIME_STEP * machine.limits["acceleration"]
         self._moving = np.isin(np.arange(N_AXES), moving_axes(platform))
 
     def __call__(self, position: Floats, rate: Floats) -> Floats:
@@ -35,8 +43,12 @@ class Brakes:
             position: (9,) of the axes.
             rate: (9,).
         """
-        legs, slope, drift = (np.asarray(part) for part in self._legs(position, rate))
-        actuators = np.concatenate([rate[:2], legs[:, 0], rate[8:]])
-        stop = -np.clip(actuators / TIME_STEP, -self._limit, self._limit)
-        stop[2:8] = np.linalg.solve(slope, stop[2:8] - drift[:, 0])
-        return np.asarray(np.where(self._moving, stop, 0.0))
+        legs = np.asarray(self._rates(position, rate))[:, 0]
+        actuators = np.concatenate([rate[:2], legs, rate[8:]])
+        wanted = actuators - np.clip(actuators, -self._change, self._change)
+        action = (wanted - actuators) / TIME_STEP
+        action[2:8] = 0.0
+        for _ in range(_ROUNDS):
+            after, slope = (np.asarray(part) for part in self._after(position, rate, action))
+            action[2:8] += np.linalg.solve(slope, wanted[2:8] - after[:, 0])
+        return np.asarray(np.where(self._moving, action, 0.0))

@@ -47,9 +47,9 @@ class Weights:
         turntable: The turntable. Position counts only where its travel ends.
     """
 
-    carriage: AxisWeights = AxisWeights(0.001, 0.0, 0.001, 0.01, 0.1)
-    translation: AxisWeights = AxisWeights(0.1, 0.05, 0.01, 1.0, 1.0)
-    tilt: AxisWeights = AxisWeights(0.2, 0.0, 0.01, 2.0, 2.0)
+    carriage: AxisWeights = AxisWeights(0.0005, 0.0005, 0.001, 0.004, 0.3)
+    translation: AxisWeights = AxisWeights(0.07, 0.035, 0.012, 0.7, 1.5)
+    tilt: AxisWeights = AxisWeights(0.1, 0.0, 0.012, 1.5, 3.0)
     yaw: AxisWeights = AxisWeights(2.0, 1.0, 0.1, 10.0, 10.0)
     turntable: AxisWeights = AxisWeights(0.01, 0.0, 0.05, 0.1, 0.0)
 
@@ -68,10 +68,10 @@ class Forecast:
     """
 
     preview: NonNegative = 0.0
-    memory: Positive = 2.0
-    force_decay: tuple[Positive, Positive, Positive] = (2.0, 0.7, 0.7)
-    rate_decay: Positive = 1.5
-    lasting_decay: Positive = 10.0
+    memory: Positive = 4.0
+    force_decay: tuple[Positive, Positive, Positive] = (3.0, 2.0, 2.0)
+    rate_decay: Positive = 0.3
+    lasting_decay: Positive = 5.0
 
 
 @configuration
@@ -114,6 +114,8 @@ class MpcParameters:
         every: Time steps from one solution to the next; in between the plan is followed.
         objective: "cab": the error of the cab's cues, as J; "perceived": of what is sensed of them.
         vestibular: Model of perception for the objective "perceived".
+        cab_share: What the cab's error counts beside the perceived one, for the objective "perceived":
+            motion too quick to be sensed would cost nothing otherwise.
         forecast: The car's cues over the horizon.
         weights: Cost of motion.
         tilt_rate: Soft limit.
@@ -129,6 +131,7 @@ class MpcParameters:
     every: Whole = 1
     objective: Literal["cab", "perceived"] = "cab"
     vestibular: str = "zacharias"
+    cab_share: NonNegative = 0.1
     forecast: Forecast = Forecast()
     weights: Weights = Weights()
     tilt_rate: TiltRate = TiltRate()

@@ -78,6 +78,7 @@ class Problem:
         self, platform: Platform, parameters: MpcParameters, grid: Grid, perceived: Floats | None = None
     ) -> None:
         self.grid, self._parameters, self._perceived = grid, parameters, perceived
+        self._cab_share = np.sqrt(parameters.cab_share)
         self.axes = moving_axes(platform)
         n, k = len(grid.times), len(self.axes)
         self.size = n * k
@@ -102,7 +103,8 @@ class Problem:
         """
         slope = self.condensed(about.slopes[:, :N_CUES])
         if self._perceived is not None:
-            slope = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
+            felt = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
+            slope = np.concatenate([felt, self._cab_share * slope], axis=1)
         residual = (self._scale * self._error(about, wanted, sensed)).ravel()
         jacobian = (self._scale[:, :, None] * slope).reshape(len(residual), -1)
         return Quadratic(
@@ -121,11 +123,12 @@ class Problem:
         return float(0.5 * (squares + self._motion_cost(plan)) + priced)
 
     def _error(self, about: Linearisation, wanted: Floats, sensed: Floats | None) -> Floats:
-        """(n, 6) error of the cues, or of what is sensed of them, in zones."""
+        """(n, 6) error of the cues in zones; (n, 12) of what is sensed of them, and a share of themselves."""
         error = about.values[:, :N_CUES] - wanted / cue_scales()
-        if self._perceived is not None:
-            error = np.einsum("cji,ic->jc", self._perceived, error)
-        return error if sensed is None else error + sensed
+        if self._perceived is None:
+            return np.asarray(error)
+        felt = np.einsum("cji,ic->jc", self._perceived, error)
+        return np.hstack([felt if sensed is None else felt + sensed, self._cab_share * error])
 
     def condensed(self, slopes: Floats) -> Floats:
         """(n, r, m) derivatives of rows by the unknowns, from those by their node's motion (n, r, 27)."""

@@ -80,19 +80,19 @@ def solve(
     if failed:
         return _unsolved(problem, guess)
     free = -lapack.dpotrs(factor, cost.gradient, lower=1)[0]
-    unknowns, working, active, relaxed = free, guess, guess[:0], 0.0
-    multipliers = np.zeros(0)
+    unknowns, working = free, guess
+    multipliers, hard = np.zeros(0), _hard(bounds)
     for count in range(rounds + 1):
         change = problem.change(unknowns)
         excess = _excess(about.ahead(np.hstack([change.position, change.rate, change.acceleration])), bounds)
-        violated = np.setdiff1d(np.flatnonzero(excess > TOLERANCE), working)
+        relaxed = float(max(np.max(excess[hard]), 0.0))
+        excess[working] = 0.0
+        violated = np.flatnonzero(excess > TOLERANCE)
         if count and not len(violated):
-            active = working[multipliers > 0.0]
-            relaxed = float(max(np.max(excess[_hard(bounds)], initial=0.0), 0.0))
-            return Solution(change, active, count, relaxed, True)
+            return Solution(change, working[multipliers > 0.0], count, relaxed, True)
         working = np.concatenate([working, violated])
         if not len(working):
-            return Solution(change, active, 0, 0.0, True)
+            return Solution(change, working, 0, 0.0, True)
         solved = _with_rows(problem, about, bounds, factor, free, working)
         if solved is None:
             break

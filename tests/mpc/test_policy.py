@@ -1,0 +1,163 @@
+"""Predictive controllers in drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motion_cueing.baselines import ForeknowingPolicy, make_policy, policy_names
+from motion_cueing.baselines.mpc import MpcParameters, TiltRate, make_mpc
+from motion_cueing.baselines.mpc import solver as solver_module
+from motion_cueing.baselines.mpc.braking import Brakes
+from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.observation import OBSERVATION_SIZE
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.simulator import Simulator
+from motion_cueing.evaluation import measure, rollout
+from motion_cueing.evaluation.trajectory import Trajectory
+
+from .machines import NODES, PAPER, quick
+
+
+def part(name: str, begin: float, seconds: float, fierce: float = 1.0) -> CueTrace:
+    """Some seconds of a maneuver, its cues scaled about rest."""
+    whole = get_maneuver(name).drive()
+    rows = slice(round(begin * 100), round((begin + seconds) * 100))
+    force = (whole.specific_force[rows] + [0.0, 0.0, 9.81]) * fierce - [0.0, 0.0, 9.81]
+    return CueTrace(name, whole.time[rows], force, fierce * whole.angular_velocity[rows])
+
+
+SLALOM = part("slalom", 4.0, 2.5)
+
+
+def driven(cues: CueTrace, platform=PAPER, **fields: object) -> Trajectory:
+    return rollout(make_mpc(platform, quick(**fields)), cues, platform)
+
+
+def test_fierce_drives_meet_no_limit():
+    trajectory = driven(part("slalom", 5.0, 4.0, fierce=2.0), preview=1.0, every=1)
+    assert not np.any(trajectory.limits_active)
+    assert trajectory.metadata["mpc_failures"] == "0"
+    assert np.abs(trajectory.carriage_rate).max() > 3.0  # it was a fierce drive
+
+
+@pytest.mark.parametrize("name", ["dim-hexapod", "24-inch"])
+def test_small_machines_keep_their_limits(name):
+    platform = get_platform(name)
+    trajectory = driven(SLALOM, platform, preview=1.0)
+    assert measure(trajectory).at_limit <= 0.01
+    assert not np.any(trajectory.action[:, :2])
+    assert np.abs(trajectory.hexapod).max() > 0.01
+
+
+def test_what_is_known_ahead_helps():
+    ignorant, told, whole = (
+        measure(driven(SLALOM, preview=p)).cue_error for p in (0.0, 1.0, quick().horizon)
+    )
+    still = measure(rollout(make_policy("no-motion", PAPER), SLALOM, PAPER)).cue_error
+    assert whole < told < ignorant < still
+    assert told < 0.05 * still
+
+
+def test_the_same_drive_gives_the_same_motion():
+    policy = make_mpc(PAPER, quick(preview=1.0))
+    first, second = (rollout(policy, SLALOM, PAPER) for _ in range(2))
+    assert np.array_equal(first.action, second.action)
+    assert first.metadata["mpc_solves"] == second.metadata["mpc_solves"] == str(len(SLALOM) // 2)
+
+
+def test_between_solutions_the_plan_is_followed():
+    often, seldom = (measure(driven(SLALOM, preview=1.0, every=k)).cue_error for k in (1, 5))
+    assert seldom < 1.5 * often + 0.05
+
+
+def test_a_batch_is_as_many_machines_by_themselves():
+    policy = make_mpc(PAPER, quick())
+    rows = np.random.default_rng(0).normal(size=(3, OBSERVATION_SIZE)) * 0.05
+    together, memory = policy.predict(rows)
+    assert together.shape == (3, 9)
+    for i in range(3):
+        alone, _ = policy.predict(rows[i])
+        assert np.array_equal(alone, together[i])
+    later, _ = policy.predict(rows, memory, np.array([True, False, True]))
+    assert np.array_equal(later[0], together[0])
+    assert np.array_equal(later[2], together[2])
+
+
+def test_the_turntable_goes_round_and_round():
+    n = 1200
+    yaw = np.column_stack([np.zeros((n, 2)), np.full(n, 0.6)])
+    cues = CueTrace("merry-go-round", 0.01 * np.arange(n), np.tile([0.0, 0.0, -9.81], (n, 1)), yaw)
+    trajectory = driven(cues, preview=1.0, every=10)
+    assert trajectory.turntable[-1] > 2.0 * np.pi
+    assert np.abs(np.diff(trajectory.turntable_rate[300:])).max() < 0.01
+    assert trajectory.w_felt[-1, 2] == pytest.approx(0.6, abs=0.02)
+
+
+def test_no_plan_means_braking_to_a_stop_within_limits(monkeypatch):
+    real = solver_module.solve
+    calls = []
+
+    def failing(problem, *arguments):
+        calls.append(1)
+        if len(calls) <= 100:
+            return real(problem, *arguments)
+        return solver_module._unsolved(problem, np.zeros(0, dtype=np.intp))
+
+    monkeypatch.setattr("motion_cueing.baselines.mpc.planner.solve", failing)
+    trajectory = driven(part("slalom", 5.0, 3.5, fierce=1.5), preview=1.0)
+    assert trajectory.metadata["mpc_failures"] == str(len(calls) - 100)
+    assert len(calls) > 150
+    assert not np.any(trajectory.limits_active)
+    moving = np.abs(trajectory.carriage_rate).max(axis=1)
+    assert moving[200] > 0.3
+    for rates in (trajectory.carriage_rate, trajectory.legs_rate, trajectory.turntable_rate):
+        assert np.abs(rates[-1]).max() < 1e-6
+
+
+def test_brakes_stop_every_actuator_without_meeting_a_limit():
+    rng = np.random.default_rng(8)
+    still = CueTrace("still", 0.01 * np.arange(9), np.tile([0.0, 0.0, -9.81], (9, 1)), np.zeros((9, 3)))
+    simulator = Simulator(PAPER, still)
+    simulator.reset()
+    for _ in range(30):
+        simulator.step(rng.normal(size=9) + np.array([3.0, -3.0, 1.0, 1.0, 0.5, 0.5, -0.5, 0.5, 1.0]))
+    brakes = Brakes(PAPER)
+    for _ in range(200):
+        motion = simulator.state[0]["motion"]
+        q = np.concatenate(
+            [motion["position"][:2], motion["displacement"], motion["beta"], motion["position"][8:]]
+        )
+        v = np.concatenate([motion["rate"][:2], motion["velocity"], motion["beta_rate"], motion["rate"][8:]])
+        simulator.step(brakes(q, v))
+        assert simulator.state[0]["limits"] == 0
+    assert np.abs(simulator.state[0]["motion"]["rate"]).max() < 1e-9
+
+
+def test_tilt_rate_is_held_back_where_it_has_a_price():
+    braking = part("braking", 2.0, 3.0, fierce=2.0)
+    limit = TiltRate().limit
+    free = measure(driven(braking)).tilt_rate_peak
+    priced = measure(driven(braking, tilt_rate=TiltRate(weight=1000.0))).tilt_rate_peak
+    assert priced < 1.3 * limit < 0.5 * free
+
+
+def test_the_perceived_objective_lowers_the_perceived_error():
+    nodes = (*NODES, 2.6, 4.2)
+    cab, perceived = (
+        measure(driven(part("braking", 2.0, 6.0), preview=4.2, every=4, nodes=nodes, objective=objective))
+        for objective in ("cab", "perceived")
+    )
+    assert perceived.perceived_cue_error < 0.9 * cab.perceived_cue_error
+
+
+def test_registered_names_make_policies():
+    for name in ("mpc", "mpc-preview", "mpc-full", "nmpc", "nmpc-preview"):
+        assert name in policy_names()
+        policy = make_policy(name, PAPER)
+        assert isinstance(policy, ForeknowingPolicy) == (name not in ("mpc", "nmpc"))
+        assert policy.name == name
+    full = make_policy("mpc-full", PAPER).parameters
+    assert isinstance(full, MpcParameters)
+    assert full.forecast.preview >= full.horizon
