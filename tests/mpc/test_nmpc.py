@@ -99,7 +99,7 @@ def test_machine_code_gives_the_same_numbers_and_is_kept(cache):
         return
     library = next(cache.glob("*.so"))
     made, whole = library.stat().st_mtime_ns, library.read_bytes()
-    assert compiled(function()).class_name() == "GenericExternal"
+    assert compiled(function()).class_name() == "External"
     assert library.stat().st_mtime_ns == made
     # A torn library is not loaded but made again.
     library.unlink()
