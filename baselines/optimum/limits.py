@@ -1,11 +1,12 @@
 """The limits of a machine at a node, as inequalities lower <= h(q, v, a) <= upper.
 
-For every actuator with travel, with its extension l, rate ldot and limit of acceleration A:
+With the extension l of an actuator, its limits of speed V and acceleration A, and the spacing T of the nodes:
 
     l + ldot^2 / (2 A) <= l_max,    l - ldot^2 / (2 A) >= l_min,
+    |ldot + lddot T / 4| <= V,      |ldot - lddot T / 4| <= V,      |lddot| <= A.
 
-which holds for a motion within its limits exactly if it can always be stopped in time; and for every leg
-|ldot| <= V and |lddot| <= A. Speed and acceleration of carriage and turntable are bounds of the variables.
+The first line holds for a motion within its limits exactly if it can always be stopped in time. In the second
+one T / 4 is for the way between nodes: where lddot is a straight line that crosses zero, ldot peaks there.
 """
 
 from __future__ import annotations
@@ -39,34 +40,56 @@ class NodeLimits:
 
 
 def node_limits(
-    machine: SymbolicMachine, q: Expression, v: Expression, a: Expression, spacing: float, margin: float
+    machine: SymbolicMachine,
+    q: Expression,
+    v: Expression,
+    a: Expression,
+    spacing: float,
+    margin: float,
+    widened: float | None = None,
 ) -> NodeLimits:
-    """The inequalities of a node.
+    """The inequalities of a node; the last six are those of leg accelerations.
 
     Args:
         machine: The machine.
         q: (9,) positions.
         v: (9,) rates.
         a: (9,) accelerations.
-        spacing: From one node to the next, s: how far an end may be overshot between them is kept free.
+        spacing: From one node to the next, s.
         margin: Share of the limits of speed and acceleration that is kept free.
+        widened: The same where it is wider than what was counted on for braking; default: ``margin``.
     """
     legs, limits = machine.leg_motion(q, v, a), machine.limits
-    extension = cs.vertcat(q[:2], legs.extension, q[TURNTABLE])
-    rate = cs.vertcat(v[:2], legs.rate, v[TURNTABLE])
+    extension, rate, acceleration = (
+        cs.vertcat(axes[:2], part, axes[TURNTABLE]) for axes, part in zip((q, v, a), legs, strict=True)
+    )
+    used = 1.0 - (margin if widened is None else widened)
+    there = np.flatnonzero(_present(limits))
+    stopping = _stopping(extension, rate, limits, spacing, 1.0 - margin)
+    speed, force = limits["velocity"][there] * used, limits["acceleration"][LEGS] * used
+    peak = acceleration[there.tolist()] * spacing / 4.0
+    rates = rate[there.tolist()]
+    return NodeLimits(
+        cs.vertcat(stopping.value, rates + peak, rates - peak, legs.acceleration),
+        np.concatenate([stopping.lower, -speed, -speed, -force]),
+        np.concatenate([stopping.upper, speed, speed, force]),
+    )
+
+
+def _stopping(
+    extension: Expression, rate: Expression, limits: dict[str, Floats], spacing: float, used: float
+) -> NodeLimits:
+    """Every actuator with travel can stop before its ends."""
     with_travel = np.flatnonzero(np.isfinite(limits["position_max"]) & _present(limits))
-    most = limits["acceleration"][with_travel] * (1.0 - margin)
-    rows = with_travel.tolist()
+    rows, most = with_travel.tolist(), limits["acceleration"][with_travel] * used
     # Between nodes an actuator that stops there goes at most A spacing^2 / 8 further.
     free = most * spacing**2 / 8.0
-    stopping = rate[rows] ** 2 / (2.0 * cs.DM(most))
+    way = rate[rows] ** 2 / (2.0 * cs.DM(most))
     unbounded = np.full(len(rows), np.inf)
-    speed = limits["velocity"][LEGS] * (1.0 - margin)
-    force = limits["acceleration"][LEGS] * (1.0 - margin)
     return NodeLimits(
-        cs.vertcat(extension[rows] + stopping, extension[rows] - stopping, legs.rate, legs.acceleration),
-        np.concatenate([-unbounded, limits["position_min"][with_travel] + free, -speed, -force]),
-        np.concatenate([limits["position_max"][with_travel] - free, unbounded, speed, force]),
+        cs.vertcat(extension[rows] + way, extension[rows] - way),
+        np.concatenate([-unbounded, limits["position_min"][with_travel] + free]),
+        np.concatenate([limits["position_max"][with_travel] - free, unbounded]),
     )
 
 

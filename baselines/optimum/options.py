@@ -39,7 +39,7 @@ class OptimumOptions:
     objective: Literal["J", "perceived"] = "J"
     steps: Annotated[int, Field(ge=1, le=50)] = 5
     window: Positive = 60.0
-    keep: Positive = 30.0
+    keep: Positive = 45.0
     force_zone: Positive = 0.6
     rate_zone: Positive = math.radians(3.0)
     effort: NonNegative = 1e-4

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Final
+from functools import cached_property, lru_cache
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from ..symbolic import SymbolicMachine
 from .blocks import Blocks, blocks_of
 from .interval import N_CUES, interval, mean_accelerations
 from .limits import axis_bounds, node_limits
+from .listener import Tell, Watch
 from .options import OptimumOptions
 from .perception import SensedError, sensed_error
 from .transcription import Transcription
@@ -73,6 +73,26 @@ class Start:
     memory: Floats
 
 
+class Parts(NamedTuple):
+    """Functions of an interval, and the ranges of a node's inequalities."""
+
+    blocks: Blocks
+    lower: Floats
+    upper: Floats
+
+
+@lru_cache(maxsize=8)
+def _parts(
+    platform: Platform, options: OptimumOptions, vestibular: VestibularModel, dt: float, margin: float
+) -> Parts:
+    """Made once for all drives on a machine."""
+    machine = SymbolicMachine(platform)
+    sensed = sensed_error(vestibular, dt) if options.objective == "perceived" else None
+    part = interval(machine, options, sensed, dt)
+    limits = node_limits(machine, part.q, part.v, part.a, options.steps * dt, options.margin, widened=margin)
+    return Parts(blocks_of(part, limits, options), limits.lower, limits.upper)
+
+
 class Problem:
     """Windows of drives on one machine.
 
@@ -92,22 +112,21 @@ class Problem:
         vestibular: VestibularModel,
         dt: float,
         margin: float,
-        tell: Callable[[int], None] | None = None,
+        tell: Tell | None = None,
     ) -> None:
         self.options, self.dt, self.margin = options, dt, margin
+        self._vestibular = vestibular
         self._machine = SymbolicMachine(platform)
-        self._tell = tell
+        self._watch = Watch(tell)
         self.sensed: SensedError | None = None
         if options.objective == "perceived":
             self.sensed = sensed_error(vestibular, dt)
         self._transcriptions: dict[int, Transcription] = {}
 
     @cached_property
-    def _parts(self) -> tuple[Blocks, Floats, Floats]:
-        part = interval(self._machine, self.options, self.sensed, self.dt)
-        spacing = self.options.steps * self.dt
-        limits = node_limits(self._machine, part.q, part.v, part.a, spacing, self.margin)
-        return blocks_of(part, limits, self.options), limits.lower, limits.upper
+    def _parts(self) -> Parts:
+        machine, options = self._machine.platform, self.options
+        return _parts(machine, options, self._vestibular, self.dt, self.margin)
 
     def solve(self, wanted: Floats, start: Start) -> Solution:
         """The best accelerations for a window.
@@ -115,16 +134,19 @@ class Problem:
         Args:
             wanted: (n, 6) force and rate of the car at the n samples after the start.
             start: Where the window begins.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C was pressed.
         """
         count = -(-len(wanted) // self.options.steps)
         given = self._given(wanted, count)
         program = self._transcription(count)
-        result = program.solver(
-            x0=self._guess(count, start),
-            p=given,
-            **dict(zip(("lbx", "ubx"), self._bounds(count, start), strict=True)),
-            **dict(zip(("lbg", "ubg"), self._ranges(program), strict=True)),
-        )
+        lower, upper = self._bounds(count, start)
+        least, most = self._ranges(program)
+        with self._watch.solving():
+            result = program.solver(
+                x0=self._guess(count, start), p=given, lbx=lower, ubx=upper, lbg=least, ubg=most
+            )
         stats = program.solver.stats()
         x = np.array(result["x"])[:, 0]
         nodes = x.reshape(count + 1, -1)
@@ -138,7 +160,7 @@ class Problem:
 
     def _transcription(self, count: int) -> Transcription:
         if count not in self._transcriptions:
-            self._transcriptions[count] = Transcription(self._parts[0], count, self._ipopt(), self._tell)
+            self._transcriptions[count] = Transcription(self._parts.blocks, count, self._ipopt(), self._watch)
         return self._transcriptions[count]
 
     def _ipopt(self) -> dict[str, Any]:
@@ -161,13 +183,13 @@ class Problem:
 
     def _guess(self, count: int, start: Start) -> Floats:
         """Standing still."""
-        nodes = np.zeros((count + 1, self._parts[0].node_size))
+        nodes = np.zeros((count + 1, self._parts.blocks.node_size))
         nodes[:, :N_AXES] = start.position
         return nodes.ravel()
 
     def _bounds(self, count: int, start: Start) -> tuple[Floats, Floats]:
         """Of the variables: the start is given, carriage and turntable have limits of their own."""
-        most = np.full((count + 1, self._parts[0].node_size), np.inf)
+        most = np.full((count + 1, self._parts.blocks.node_size), np.inf)
         speed, acceleration = axis_bounds(self._machine, self.margin)
         most[:, N_AXES : 2 * N_AXES] = speed
         most[:, -N_AXES:] = acceleration
@@ -179,7 +201,7 @@ class Problem:
     def _ranges(self, program: Transcription) -> tuple[Floats, Floats]:
         """Of the constraints: no gaps, and the limits."""
         ranges = []
-        for limit in self._parts[1:]:
+        for limit in (self._parts.lower, self._parts.upper):
             nodes = np.tile(limit, (program.intervals + 1, 1))
             nodes[0, :-_LEG_ACCELERATIONS] = np.sign(limit[-1]) * np.inf
             ranges.append(np.concatenate([np.zeros(program.gaps), nodes.ravel()]))

@@ -10,7 +10,6 @@ found out by colouring, and a Hessian of Gauss and Newton keeps every step a des
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +19,7 @@ from ...envs.simulator import N_AXES
 from ..symbolic.library import Expression, cs
 from .assembly import assembled, nonzeros, repeated, triplets
 from .blocks import Blocks, interval_variables
-from .listener import listener
+from .listener import Watch, listener
 
 _QUIET: Final = {"print_level": 0, "sb": "yes"}
 
@@ -32,7 +31,7 @@ class Transcription:
         blocks: Functions of one interval.
         intervals: How many there are.
         ipopt: Options of IPOPT.
-        tell: Called with the number of iterations done.
+        watch: Hears of iterations.
     """
 
     def __init__(
@@ -40,7 +39,7 @@ class Transcription:
         blocks: Blocks,
         intervals: int,
         ipopt: dict[str, Any],
-        tell: Callable[[int], None] | None = None,
+        watch: Watch,
     ) -> None:
         self.blocks, self.intervals = blocks, intervals
         n = blocks.node_size
@@ -52,19 +51,18 @@ class Transcription:
         self._wanted = cs.reshape(self._p, blocks.cost.size1_in(1), -1)
         self.gaps = blocks.state_size * intervals
         self.constraints = self.gaps + blocks.limits.numel_out(0) * (intervals + 1)
+        # An attribute: CasADi does not keep it.
+        self._listener = listener(self._x.numel(), self.constraints, self._p.numel(), watch)
         problem = {"x": self._x, "p": self._p, "f": self._cost(), "g": self._values()}
         options = {
             "grad_f": self._gradient(),
             "jac_g": self._jacobian(),
             "hess_lag": self._hessian(),
+            "iteration_callback": self._listener,
             "print_time": False,
             "calc_lam_p": False,
             "ipopt": _QUIET | ipopt,
         }
-        if tell is not None:
-            # Kept here: CasADi does not keep it.
-            self._listener = listener(self._x.numel(), self.constraints, self._p.numel(), tell)
-            options["iteration_callback"] = self._listener
         self.solver: Expression = cs.nlpsol("optimum", "ipopt", problem, options)
 
     def _map(self, function: Expression, *given: Expression) -> Expression:
