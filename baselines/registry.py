@@ -9,9 +9,11 @@ from typing import Final, Literal
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
+from ..envs.settings import read_yaml
 from .ceiling import CeilingWashout
 from .families import family_presets, load_parameters, make_washout
 from .policy import ForeknowingPolicy, NoMotion, Policy
+from .predictive import DESCRIPTIONS, PREDICTIVE, make_predictive, predictive_from_file
 
 
 @dataclass(frozen=True)
@@ -27,23 +29,8 @@ class Entry:
     make: Callable[[Platform], Policy | ForeknowingPolicy]
 
 
-def _mpc(name: str) -> Callable[[Platform], Policy | ForeknowingPolicy]:
-    def make(platform: Platform) -> Policy | ForeknowingPolicy:
-        from .mpc import load_mpc, make_mpc
-
-        return make_mpc(platform, load_mpc(name), name)
-
-    return make
-
-
-def _nmpc(name: str, preset: str) -> Callable[[Platform], Policy | ForeknowingPolicy]:
-    def make(platform: Platform) -> Policy | ForeknowingPolicy:
-        from .mpc import load_mpc
-        from .nmpc import NmpcParameters, make_nmpc
-
-        return make_nmpc(platform, NmpcParameters(load_mpc(preset)), name)
-
-    return make
+def _predictive(name: str) -> Callable[[Platform], Policy | ForeknowingPolicy]:
+    return lambda platform: make_predictive(name, platform)
 
 
 def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Policy | ForeknowingPolicy]:
@@ -60,13 +47,7 @@ _ENTRIES: Final[Mapping[str, Entry]] = {
     CeilingWashout.name: Entry(
         "classical with the best set for each standard maneuver: the washout's ceiling", CeilingWashout
     ),
-    "mpc": Entry("predictive control that knows nothing of the drive ahead", _mpc("mpc")),
-    "mpc-preview": Entry("predictive control that sees 2 s of the drive ahead", _mpc("mpc-preview")),
-    "mpc-full": Entry("predictive control that knows the drive over its whole horizon", _mpc("mpc-full")),
-    "nmpc": Entry("nonlinear predictive control without preview", _nmpc("nmpc", "mpc")),
-    "nmpc-preview": Entry(
-        "nonlinear predictive control that sees 2 s of the drive ahead", _nmpc("nmpc-preview", "mpc-preview")
-    ),
+    **{name: Entry(told, _predictive(name)) for name, told in DESCRIPTIONS.items()},
     "optimum": Entry("the least J there is: the whole drive known, its motion planned", _optimum("J")),
     "optimum-perceived": Entry("the same for the least perceived J", _optimum("perceived")),
 }
@@ -93,7 +74,7 @@ def describe_policy(name: str) -> str:
 
 
 def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
-    """A policy for a machine, by name or from a washout's YAML file.
+    """A policy for a machine, by name or from the YAML file of a washout or a predictive controller.
 
     Raises:
         UnknownNameError: no policy has this name.
@@ -103,9 +84,16 @@ def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPol
     if str(name) in _ENTRIES:
         return _ENTRIES[str(name)].make(platform)
     if Path(name).suffix in (".yaml", ".yml"):
-        return make_washout(load_parameters(name), platform.cab)
+        return _from_file(Path(name), platform)
     if str(name) in family_presets():
         return make_washout(load_parameters(str(name)), platform.cab)
     if Path(name).exists():
         raise DataError(f"{name}: not a policy; expected a washout's .yaml file")
     raise UnknownNameError("policy", str(name), policy_names())
+
+
+def _from_file(path: Path, platform: Platform) -> Policy | ForeknowingPolicy:
+    values = read_yaml(path)
+    if isinstance(values, dict) and values.get("algorithm") in PREDICTIVE:
+        return predictive_from_file(values, path, platform)
+    return make_washout(load_parameters(path), platform.cab)

@@ -109,6 +109,7 @@ class MpcParameters:
     """A predictive controller.
 
     Args:
+        algorithm: What a file of such parameters says it is.
         nodes: Times from now at which accelerations are free, s; between them they are straight lines,
             before the first one constant. The last is the horizon.
         every: Time steps from one solution to the next; in between the plan is followed.
@@ -127,6 +128,7 @@ class MpcParameters:
             numbers, sooner.
     """
 
+    algorithm: Literal["mpc"] = "mpc"
     nodes: Annotated[tuple[float, ...], Field(min_length=2, max_length=100)] = _NODES
     every: Whole = 1
     objective: Literal["cab", "perceived"] = "cab"

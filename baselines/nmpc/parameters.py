@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -15,11 +15,13 @@ class NmpcParameters:
     """A nonlinear predictive controller.
 
     Args:
+        algorithm: What a file of such parameters says it is.
         mpc: Horizon, forecast, weights and margins, as of the linear one.
         iterations: Most programs a plan. 1 is the real-time iteration, which is the linear controller.
         tolerance: A program that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
     """
 
+    algorithm: Literal["nmpc"] = "nmpc"
     mpc: MpcParameters = MpcParameters()
     iterations: Annotated[int, Field(ge=1, le=100)] = 10
     tolerance: Positive = 0.05

@@ -62,12 +62,12 @@ def test_the_search_ends_where_a_new_program_changes_nothing():
 def test_one_iteration_is_the_linear_controller():
     parameters = quick(preview=1.0, every=4)
     linear = driven(SLALOM, preview=1.0, every=4)
-    nonlinear = rollout(make_nmpc(PAPER, NmpcParameters(parameters, iterations=1)), SLALOM, PAPER)
+    nonlinear = rollout(make_nmpc(PAPER, NmpcParameters(mpc=parameters, iterations=1)), SLALOM, PAPER)
     assert np.array_equal(linear.action, nonlinear.action)
 
 
 def test_it_drives_within_limits_and_as_well_as_the_linear_one():
-    parameters = NmpcParameters(quick(preview=1.0, every=4))
+    parameters = NmpcParameters(mpc=quick(preview=1.0, every=4))
     trajectory = rollout(make_nmpc(PAPER, parameters), SLALOM, PAPER)
     linear = measure(driven(SLALOM, preview=1.0, every=4)).cue_error
     assert measure(trajectory).cue_error < 1.1 * linear + 0.01

@@ -53,7 +53,9 @@ def test_an_unknown_model_of_perception_is_named():
 
 def test_parameters_round_trip_through_yaml(tmp_path):
     mine = NmpcParameters(
-        MpcParameters(nodes=(0.02, 0.5), forecast=Forecast(preview=0.4), margins=Margins(rate=0.5)), 3, 0.1
+        mpc=MpcParameters(nodes=(0.02, 0.5), forecast=Forecast(preview=0.4), margins=Margins(rate=0.5)),
+        iterations=3,
+        tolerance=0.1,
     )
     save(mine, tmp_path / "mine.yaml")
     assert load(NmpcParameters, tmp_path / "mine.yaml") == mine

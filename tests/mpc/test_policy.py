@@ -9,10 +9,13 @@ from motion_cueing.baselines import ForeknowingPolicy, make_policy, policy_names
 from motion_cueing.baselines.mpc import MpcParameters, TiltRate, make_mpc
 from motion_cueing.baselines.mpc import solver as solver_module
 from motion_cueing.baselines.mpc.braking import Brakes
+from motion_cueing.baselines.nmpc import NmpcParameters
 from motion_cueing.envs.car import get_maneuver
 from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import save
 from motion_cueing.envs.simulator import Simulator
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.trajectory import Trajectory
@@ -161,3 +164,14 @@ def test_registered_names_make_policies():
     full = make_policy("mpc-full", PAPER).parameters
     assert isinstance(full, MpcParameters)
     assert full.forecast.preview >= full.horizon
+
+
+@pytest.mark.parametrize("parameters", [quick(preview=0.5), NmpcParameters(mpc=quick(preview=0.5))])
+def test_parameters_in_a_file_make_a_policy(tmp_path, parameters):
+    save(parameters, tmp_path / "mine.yaml")
+    policy = make_policy(tmp_path / "mine.yaml", PAPER)
+    assert isinstance(policy, ForeknowingPolicy)
+    assert (policy.name, policy.parameters) == ("mine", parameters)
+    (tmp_path / "bad.yaml").write_text(f"algorithm: {parameters.algorithm}\nnods: [1.0]\n")
+    with pytest.raises(ConfigurationError, match=r"bad.yaml: unknown field 'nods'"):
+        make_policy(tmp_path / "bad.yaml", PAPER)
