@@ -54,6 +54,9 @@ COMMANDS: Final[Mapping[str, Command]] = {
         ".frequency_command", "FrequencyResponseCommand", "measure modulus and phase of what is felt"
     ),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
+    "demonstrate": Command(
+        ".demonstrate_command", "DemonstrateCommand", "record drives of a controller to learn from"
+    ),
 }
 
 

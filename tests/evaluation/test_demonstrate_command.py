@@ -1,0 +1,129 @@
+"""Demonstrations: what is recorded is what happened; recordings go on, and broken ones are refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from motion_cueing.baselines import ClassicalWashout
+from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.errors import DataError
+from motion_cueing.envs.observation import read
+from motion_cueing.evaluation import measure, rollout
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.train.demonstrations import Demonstration, load_demonstrations, load_index
+
+from ..optimum.drives import surge
+
+WASHOUT = ("--policy", "classical")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MOTION_CUEING_CACHE", str(tmp_path / "kept"))
+    return tmp_path / "demonstrations"
+
+
+def record(*words: str) -> int:
+    return main(["demonstrate", *words])
+
+
+def test_a_recording_is_what_happened(folder):
+    assert record(*WASHOUT, "--maneuver", "sine-with-dwell") == 0
+    (drive,) = load_demonstrations(folder)
+    (entry,) = load_index(folder).drives
+    cues = get_maneuver("sine-with-dwell").drive()
+    wanted = rollout(ClassicalWashout("classical"), cues)
+    assert len(drive) == entry.steps == len(cues) - 1
+    assert entry.cue_error == pytest.approx(measure(wanted).cue_error, rel=1e-12)
+    assert np.array_equal(drive.action, wanted.action[1:])
+    assert np.array_equal(drive.force, cues.specific_force[:-1])
+    assert np.array_equal(drive.velocity[:, 2:8], wanted.hexapod_rate[:-1])
+    assert np.allclose(read(drive.observation, "carriage"), drive.position[:, :2], atol=1e-12)
+    assert np.allclose(read(drive.observation, "wanted_rate"), cues.angular_velocity[:-1], atol=1e-12)
+
+
+def test_the_optimum_demonstrates(folder, tmp_path):
+    surge(1.0, 1.0).to_csv(tmp_path / "surge.csv")
+    assert record("--maneuver", "surge.csv") == 0
+    (entry,) = load_index(folder).drives
+    assert entry.name == "surge"
+    assert entry.cue_error < 0.01
+    assert entry.at_limit == 0.0
+    assert entry.notes["optimum_unconverged"] == "0"
+    assert load_index(folder).setting["policy"] == "optimum"
+
+
+def test_a_recording_goes_on_where_it_was_stopped(folder, capsys):
+    words = (*WASHOUT, "--random", "2", "--duration", "4", "--seed", "3")
+    assert record(*words) == 0
+    first = load_index(folder)
+    assert len(first.drives) == 2
+    (folder / first.drives[1].file).unlink()
+    before = (folder / first.drives[0].file).stat().st_mtime_ns
+    assert record(*words, "--maneuver", "sine-with-dwell") == 0
+    assert "3 drives (2 new)" in capsys.readouterr().out
+    again = load_index(folder)
+    assert {drive.name: drive.sha256 for drive in first.drives}.items() <= {
+        drive.name: drive.sha256 for drive in again.drives
+    }.items()
+    assert (folder / first.drives[0].file).stat().st_mtime_ns == before
+    assert again.provenance == first.provenance
+
+
+def test_a_folder_of_another_controller_is_refused(folder, capsys):
+    assert record(*WASHOUT, "--random", "1", "--duration", "1") == 0
+    assert record("--policy", "no-motion", "--random", "1", "--duration", "1") == 2
+    assert "holds drives of another controller" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "nothing to drive"),
+        (("--random", "-1"), "--random must not be negative"),
+        (("--random", "1", "--policy", "classical", "--objective", "perceived"), "--objective perceived"),
+        (("--random", "1", "--policy", "learned-preview"), "an agent sees"),
+        (("--random", "1", "--policy", "clasical"), "Did you mean"),
+        (("--maneuver", "no-such-drive"), "unknown maneuver"),
+    ],
+)
+def test_wrong_arguments_are_refused(folder, capsys, words, told):
+    assert record(*words) == 2
+    assert told in capsys.readouterr().err
+    assert not folder.exists()
+
+
+def test_broken_recordings_are_refused(folder):
+    assert record(*WASHOUT, "--random", "1", "--duration", "1") == 0
+    (entry,) = load_index(folder).drives
+    path = folder / entry.file
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(DataError, match="missing or damaged"):
+        list(load_demonstrations(folder))
+    index = json.loads((folder / "index.json").read_text())
+    for damaged, told in [
+        ("{", "not JSON"),
+        (json.dumps(index | {"format": 2}), "format 1"),
+        (json.dumps({"format": 1}), "missing or unknown"),
+        (json.dumps(index | {"drives": [{"name": "x"}]}), "missing or unknown"),
+    ]:
+        (folder / "index.json").write_text(damaged)
+        with pytest.raises(DataError, match=told):
+            load_index(folder)
+    with pytest.raises(DataError, match="cannot be read"):
+        load_index(folder / "nowhere")
+
+
+def test_a_demonstration_of_wrong_shape_is_refused():
+    columns = {"observation": 52, "action": 9, "force": 3, "rate": 3, "position": 9, "velocity": 9}
+    arrays = {name: np.zeros((5, size)) for name, size in columns.items()}
+    assert len(Demonstration("fine", time=np.arange(5.0), **arrays)) == 5
+    for name in columns:
+        with pytest.raises(DataError, match=f"{name} must be finite"):
+            Demonstration("broken", time=np.arange(5.0), **(arrays | {name: np.zeros((5, 2))}))
+    with pytest.raises(DataError, match="action must be finite"):
+        Demonstration("broken", time=np.arange(5.0), **(arrays | {"action": np.full((5, 9), np.nan)}))
