@@ -37,7 +37,7 @@ def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Polic
     def make(platform: Platform) -> Policy | ForeknowingPolicy:
         from .optimum import Optimum, OptimumOptions
 
-        return Optimum(platform, OptimumOptions(objective=objective))
+        return Optimum(platform, OptimumOptions(objective=objective), progress=False)
 
     return make
 

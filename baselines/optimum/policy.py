@@ -32,6 +32,7 @@ class Optimum:
         options: The problem.
         vestibular: The driver's perception, for the objective "perceived"; default: Zacharias'.
         cached: Whether plans are kept on disk and found again.
+        progress: Whether a long solve shows a bar on a terminal.
     """
 
     def __init__(
@@ -40,12 +41,13 @@ class Optimum:
         options: OptimumOptions | None = None,
         vestibular: VestibularModel | None = None,
         cached: bool = True,
+        progress: bool = True,
     ) -> None:
         self.platform = platform or get_platform("paper")
         self.parameters = options or OptimumOptions()
         self.vestibular = vestibular or get_vestibular_model("zacharias")
         self.name = "optimum" if self.parameters.objective == "J" else "optimum-perceived"
-        self._cached = cached
+        self._cached, self._progress = cached, progress
 
     def for_drive(self, cues: CueTrace) -> PlannedDrive:
         """The policy for one drive: solved here, or found among the plans kept.
@@ -77,7 +79,7 @@ class Optimum:
         found = find(key, len(cues) - 1) if self._cached else None
         if found is not None:
             return found
-        with SolveProgress(f"{self.name}: {cues.name}") as progress:
+        with SolveProgress(f"{self.name}: {cues.name}", self._progress) as progress:
             planner = Planner(self.platform, self.parameters, self.vestibular, cues, pose, progress.tell)
             plan = planner.plan()
         if self._cached:

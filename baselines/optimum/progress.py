@@ -22,16 +22,18 @@ class SolveProgress:
 
     Args:
         label: What is solved.
+        wanted: Whether to show it at all: a command that has a bar of its own does without.
     """
 
-    def __init__(self, label: str) -> None:
+    def __init__(self, label: str, wanted: bool = True) -> None:
         self._label, self._began = label, time.monotonic()
+        self._wanted = wanted and sys.stderr.isatty()
         self._shown: Progress | None = None
 
     @property
     def tell(self) -> Tell | None:
         """Called with the share that is done and the iterations; None where nothing is shown."""
-        return self._tell if sys.stderr.isatty() else None
+        return self._tell if self._wanted else None
 
     def __enter__(self) -> SolveProgress:
         return self
