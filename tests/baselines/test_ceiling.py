@@ -1,0 +1,43 @@
+"""The washout's ceiling: one set a maneuver, and none for what it was not tuned on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from motion_cueing.baselines import ForeknowingPolicy, make_policy
+from motion_cueing.baselines.ceiling import ceiling_maneuvers, load_ceiling
+from motion_cueing.baselines.washout import load_washout
+from motion_cueing.baselines.washout.batch import WashoutBatch
+from motion_cueing.envs.car import get_maneuver, maneuver_names
+from motion_cueing.envs.errors import UnknownNameError
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.evaluation import measure, rollout
+
+from .drives import trace
+
+PAPER = get_platform("paper")
+
+
+def test_there_is_a_set_for_every_standard_maneuver_and_it_is_better_than_the_others():
+    assert set(maneuver_names()) <= set(ceiling_maneuvers())
+    for name in ("lane-change", "step-steer", "sine-with-dwell"):
+        sets = [load_ceiling(name), load_washout("classical"), load_washout("classical-tuned")]
+        scores = WashoutBatch(sets, [get_maneuver(name).drive()], PAPER).scores()
+        assert scores.cue_error[0, 0] < scores.cue_error[1:, 0].min()
+        assert scores.at_limit[0, 0] == 0.0
+
+
+def test_it_is_told_the_maneuver_by_its_name():
+    policy = make_policy("classical-ceiling", PAPER)
+    assert isinstance(policy, ForeknowingPolicy)
+    cues = get_maneuver("lane-change").drive()
+    drive = rollout(policy, cues, PAPER)
+    assert drive.policy == "classical-ceiling"
+    expected = WashoutBatch([load_ceiling("lane-change")], [cues], PAPER).scores().cue_error[0, 0]
+    assert measure(drive).cue_error == pytest.approx(expected, rel=1e-9)
+    with pytest.raises(UnknownNameError, match=r"classical-ceiling 'lane-chang'\. Did you mean lane-change"):
+        policy.for_drive(replace(cues, name="lane-chang"))
+    with pytest.raises(UnknownNameError, match="maneuver of classical-ceiling 'test'"):
+        rollout(policy, trace(0.2), PAPER)
