@@ -12,6 +12,7 @@ from typing import Final
 from ..envs.cues import CueTrace
 from ..envs.errors import UnknownNameError
 from ..envs.platform.machines import Platform
+from ..envs.simulator import TIME_STEP
 from .washout import ClassicalWashout, WashoutParameters, load_washout
 
 _SETS: Final = Path(__file__).parent / "washout" / "presets" / "ceiling"
@@ -38,12 +39,13 @@ class CeilingWashout:
 
     Args:
         platform: The machine.
+        dt: Time step, s.
     """
 
     name = "classical-ceiling"
 
-    def __init__(self, platform: Platform) -> None:
-        self.platform = platform
+    def __init__(self, platform: Platform, dt: float = TIME_STEP) -> None:
+        self.platform, self.dt = platform, dt
 
     def for_drive(self, cues: CueTrace) -> ClassicalWashout:
         """The washout for a maneuver, found by the name of its cues.
@@ -51,6 +53,6 @@ class CeilingWashout:
         Raises:
             UnknownNameError: no set has been tuned for it.
         """
-        washout = ClassicalWashout(load_ceiling(cues.name), self.platform.cab, cues.dt)
+        washout = ClassicalWashout(load_ceiling(cues.name), self.platform.cab, self.dt)
         washout.name = self.name
         return washout
