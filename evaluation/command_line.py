@@ -53,6 +53,12 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "frequency-response": Command(
         ".frequency_command", "FrequencyResponseCommand", "measure modulus and phase of what is felt"
     ),
+    "compare": Command(
+        ".compare_command", "CompareCommand", "drive on several machines: how much does a controller need?"
+    ),
+    "robustness": Command(
+        ".robustness_command", "RobustnessCommand", "drive with lag, delay, noise, another car, more fiercely"
+    ),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
     "demonstrate": Command(
         ".demonstrate_command", "DemonstrateCommand", "record drives of a controller to learn from"

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -18,6 +16,7 @@ from ..envs.errors import ConfigurationError, DataError, MotionCueingError
 from ..envs.settings import to_dict
 from ..envs.storage import write_bytes
 from .figures import maneuver_figure
+from .file_names import file_names
 from .ladder import ALL_RUNGS
 from .ladder_figure import ladder_figure
 from .ladder_table import ladder_table, save_ladder
@@ -194,7 +193,9 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
         (plan.car.name, to_dict(plan.car)),
         outcome.metadata,
     )
-    return Results.of(outcome.maneuvers, outcome.failures, origin, left_out=plan.left_out)
+    return Results.of(
+        outcome.maneuvers, outcome.failures, origin, left_out=plan.left_out, notes=outcome.notes
+    )
 
 
 def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
@@ -206,19 +207,6 @@ def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
         save_ladder(results, folder)
         write_bytes(folder / "ladder.png", ladder)
     save_report(results, figures, folder / "report.html", ladder)
-
-
-def file_names(labels: Iterable[str]) -> dict[str, str]:
-    """Each label as part of a file name, no two alike, even where case does not count."""
-    names: dict[str, str] = {}
-    taken: set[str] = set()
-    for label in labels:
-        # A pair of names is joined by `--`: within a name it would make two pairs alike.
-        plain = re.sub(r"--+", "-", re.sub(r"[^\w.+-]+", "_", label)).strip("-") or "_"
-        numbered = (f"{plain}_{number}" for number in count(2))
-        names[label] = next(name for name in chain([plain], numbered) if name.casefold() not in taken)
-        taken.add(names[label].casefold())
-    return names
 
 
 def _drive_with(name: str, platform: Platform, car: Car) -> Drive:

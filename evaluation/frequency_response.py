@@ -21,10 +21,9 @@ from ..envs.simulator import Simulator
 from .drivers import Observer, TaskPolicy
 from .frequency_probe import FrequencyTest, Probe, harmonic, probe
 from .metrics import CUE_AXES, cab_motion
-from .rollout import rollout
+from .rollout import AnyPolicy, rollout
 from .trajectory import Floats
 
-AnyPolicy = Policy | TaskPolicy | ForeknowingPolicy
 Complexes = NDArray[np.complex128]
 
 

@@ -23,6 +23,7 @@ LADDER: Final = (
     "nmpc",
     "mpc-preview",
     "nmpc-preview",
+    "mpc-full",
     "learned-preview",
     "optimum-perceived",
     "optimum",

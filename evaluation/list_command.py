@@ -41,14 +41,14 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
         maneuver_names,
         recording_names,
     )
-    from ..envs.platform import get_platform, platform_names
+    from ..envs.platform import ablation_names, get_platform, platform_names
     from .policies import describe_policy, policy_names
 
     return [
         ("Policies", [(name, describe_policy(name)) for name in policy_names()]),
         ("Maneuvers", _lines(maneuver_names(), get_maneuver)),
         ("Recorded drives", [(name, get_recording(name).source) for name in recording_names()]),
-        ("Motion bases", _lines(platform_names(), get_platform)),
+        ("Motion bases", _lines([*platform_names(), *ablation_names()], get_platform)),
         ("Cars", _lines(car_names(), get_car)),
     ]
 

@@ -30,6 +30,11 @@ def describe_policy(name: str) -> str:
     return get_agent(name).description if name in agent_names() else baselines.describe_policy(name)
 
 
+def is_agent(name: str) -> bool:
+    """Whether a name or file means an agent."""
+    return name in agent_names() or Path(name).suffix == SUFFIX
+
+
 def find_agent(name: str) -> Agent:
     """An agent by the name of a shipped one, or by file.
 
@@ -48,7 +53,7 @@ def make_policy(name: str, platform: Platform) -> Policy | TaskPolicy | Foreknow
         DataError: the file does not exist or cannot be read.
         ConfigurationError: a field of the file is wrong, or its agent was made for another machine.
     """
-    if name in agent_names() or Path(name).suffix == SUFFIX:
+    if is_agent(name):
         agent = find_agent(name)
         check_machine(agent, platform)
         return agent

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,14 @@ from ..envs.settings import to_dict
 from ..envs.simulator import N_AXES
 from .drivers import Driver
 from .trajectory import LimitTable, Trajectory
+
+_ABOUT: Final = ("parameters", "vestibular", "source")
+"""Metadata of every trajectory; what else there is a policy noted."""
+
+
+def notes_of(metadata: Mapping[str, str]) -> dict[str, str]:
+    """What a policy counted in a drive, such as solves that did not converge, by the drive's metadata."""
+    return {name: text for name, text in metadata.items() if name not in _ABOUT}
 
 
 @dataclass(frozen=True)

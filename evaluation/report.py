@@ -20,6 +20,7 @@ from .tables import (
     machine_table,
     maneuver_table,
     matrix_table,
+    notes_table,
     share_table,
     standings_table,
 )
@@ -73,6 +74,7 @@ def _part(results: Results, maneuver: str, figure: bytes | None) -> dict[str, An
         "verdict": next(verdict for verdict in results.verdicts if verdict.maneuver == maneuver),
         "axes": axis_table(maneuver, drives),
         "machine": machine_table(maneuver, drives),
+        "notes": notes_table(maneuver, results.notes.get(maneuver, {})),
         "image": _embedded(figure),
     }
 

@@ -73,6 +73,7 @@ class Results:
         criteria: The thresholds the metrics were measured with.
         shares: Share of the gap by maneuver and policy.
         left_out: Policies that were asked for but cannot be driven here, and why.
+        notes: What policies counted in a drive, by maneuver and policy, where they did.
     """
 
     schema: int
@@ -84,6 +85,7 @@ class Results:
     criteria: Criteria
     shares: dict[str, dict[str, Share]] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
+    notes: dict[str, dict[str, dict[str, str]]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -93,6 +95,7 @@ class Results:
         provenance: Provenance,
         criteria: Criteria | None = None,
         left_out: Mapping[str, str] | None = None,
+        notes: Mapping[str, dict[str, dict[str, str]]] | None = None,
     ) -> Results:
         """Judge the metrics and put everything together."""
         criteria = criteria or Criteria()
@@ -111,6 +114,7 @@ class Results:
             criteria=criteria,
             shares={name: shares_of(drives, criteria) for name, drives in finished.items()},
             left_out=dict(left_out or {}),
+            notes=dict(notes or {}),
         )
 
     @property

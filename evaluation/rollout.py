@@ -17,9 +17,12 @@ from .drivers import TaskPolicy, make_driver
 from .recording import record, trajectory_of
 from .trajectory import Trajectory
 
+AnyPolicy = Policy | TaskPolicy | ForeknowingPolicy
+"""Whatever :func:`rollout` takes through a drive."""
+
 
 def rollout(
-    policy: Policy | TaskPolicy | ForeknowingPolicy,
+    policy: AnyPolicy,
     cues: CueTrace,
     platform: Platform | None = None,
     car: Car | None = None,

@@ -10,6 +10,7 @@ from ..envs.cues import CueTrace
 from ..envs.errors import MotionCueingError
 from .criteria import Criteria
 from .metrics import Metrics, measure
+from .recording import notes_of
 from .results import Failure
 from .trajectory import Trajectory
 
@@ -34,11 +35,13 @@ class Outcome:
         maneuvers: Metrics by maneuver and policy, in the order they were run.
         metadata: The metadata of each policy's first trajectory.
         failures: Drives without a result.
+        notes: What policies counted, by maneuver and policy, where they did.
     """
 
     maneuvers: dict[str, dict[str, Metrics]] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     failures: list[Failure] = field(default_factory=list)
+    notes: dict[str, dict[str, dict[str, str]]] = field(default_factory=dict)
 
 
 def run_suite(
@@ -73,6 +76,8 @@ def run_suite(
         drives = {name: drives[name] for name in measured}
         for name, drive in drives.items():
             outcome.metadata.setdefault(name, dict(drive.metadata))
+            if notes_of(drive.metadata):
+                outcome.notes.setdefault(maneuver, {})[name] = notes_of(drive.metadata)
         if drives:
             try:
                 finish(maneuver, drives)

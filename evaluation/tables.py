@@ -136,6 +136,12 @@ def machine_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
     return TextTable(f"{maneuver}: use of the machine", ("policy", *actuators), tuple(rows))
 
 
+def notes_table(maneuver: str, notes: Mapping[str, Mapping[str, str]]) -> TextTable:
+    """What each policy counted on one maneuver."""
+    rows = [(policy, name, text) for policy, found in notes.items() for name, text in found.items()]
+    return TextTable(f"{maneuver}: what policies counted", ("policy", "of", "counted"), tuple(rows))
+
+
 def matrix_table(results: Results) -> TextTable:
     """J by maneuver and policy."""
     policies = results.policies

@@ -1,10 +1,11 @@
 """The motion base: carriage, hexapod, turntable, their limits and kinematics."""
 
+from .ablations import ablations
 from .actuators import ActuatorDynamics
 from .kinematics import legs_of_pose, pose_of_legs
 from .machines import Cab, Carriage, Hexapod, Platform, Turntable
 from .parameters import actuator_limits
-from .presets import get_platform, load_platform, platform_names
+from .presets import ablation_names, get_platform, load_platform, platform_names
 from .state import ACTUATORS, AXES
 
 __all__ = [
@@ -16,6 +17,8 @@ __all__ = [
     "Hexapod",
     "Platform",
     "Turntable",
+    "ablation_names",
+    "ablations",
     "actuator_limits",
     "get_platform",
     "legs_of_pose",

@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import GeometryError, look_up
+from ..errors import GeometryError, UnknownNameError
 from ..settings import Vector3, load
+from .ablations import ablations
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
 from .parameters import check_geometry
 
@@ -169,17 +170,31 @@ _PRESETS: Final[dict[str, Callable[[], Platform]]] = {
 
 
 def platform_names() -> list[str]:
-    """Names :func:`get_platform` knows."""
+    """Names of whole machines that :func:`get_platform` knows."""
     return list(_PRESETS)
 
 
+def ablation_names() -> list[str]:
+    """Names of machines with a subsystem locked that :func:`get_platform` knows, too."""
+    return list(_ablated())
+
+
+def _ablated() -> dict[str, Platform]:
+    return {platform.name: platform for make in _PRESETS.values() for platform in ablations(make())}
+
+
 def get_platform(name: str) -> Platform:
-    """A machine by name.
+    """A machine by name; -no-turntable, -no-carriage or -hexapod-only at its end locks subsystems.
 
     Raises:
         UnknownNameError: no preset has this name.
     """
-    return look_up("platform", name, _PRESETS)()
+    if name in _PRESETS:
+        return _PRESETS[name]()
+    ablated = _ablated()
+    if name not in ablated:
+        raise UnknownNameError("platform", name, [*_PRESETS, *ablated])
+    return ablated[name]
 
 
 def load_platform(path: str | Path) -> Platform:

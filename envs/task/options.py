@@ -13,7 +13,7 @@ from ..cue_cost import CueCost
 from ..errors import UnknownNameError
 from ..perception.models import vestibular_model_names
 from ..platform.machines import Platform
-from ..platform.presets import platform_names
+from ..platform.presets import ablation_names, platform_names
 from ..platform.state import AXES
 from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
 
@@ -220,5 +220,5 @@ class TaskOptions:
 
     def __post_init__(self) -> None:
         if isinstance(self.platform, str):
-            _check_names("platform", [self.platform], platform_names())
+            _check_names("platform", [self.platform], [*platform_names(), *ablation_names()])
         _check_names("vestibular model", [self.vestibular], vestibular_model_names())

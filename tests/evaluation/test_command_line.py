@@ -19,7 +19,8 @@ from motion_cueing.envs.errors import MotionCueingError
 from motion_cueing.evaluation import evaluate_command
 from motion_cueing.evaluation.__main__ import with_default
 from motion_cueing.evaluation.command_line import COMMANDS, main
-from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line, file_names
+from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line
+from motion_cueing.evaluation.file_names import file_names
 from motion_cueing.evaluation.results import Results
 from motion_cueing.evaluation.selection import find_maneuvers
 from motion_cueing.evaluation.trajectory import Trajectory

@@ -54,6 +54,7 @@ def test_json_is_strict_and_documented(results, tmp_path):
         "criteria",
         "shares",
         "left_out",
+        "notes",
     ]
     assert values["maneuvers"]["weave"]["no-motion"]["axes"]["f_y"]["correlation"] is None
     assert list(values["maneuvers"]["weave"]["washout"]["axes"]) == list(CUE_AXES)

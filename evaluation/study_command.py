@@ -1,0 +1,103 @@
+"""What the studies' commands have in common: checks, results, files."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from shlex import join
+from typing import Final
+
+from rich.console import Console
+
+from ..envs.errors import DataError
+from ..envs.storage import write_bytes
+from .criteria import Criteria
+from .provenance import versions
+from .study import Condition, StudyOutcome, run_study
+from .study_results import SCHEMA, StudyResults, common_maneuvers, summarise
+from .study_tables import matrix_table, print_study
+from .suite_progress import suite_progress
+from .text_table import save_markdown
+
+_PLAIN_WIDTH: Final = 180
+"""Columns of the tables where the output is no terminal."""
+
+
+def check_folder(out: Path, fresh: bool) -> None:
+    """Refuse a file; with ``fresh``, forget the drives that are kept.
+
+    Raises:
+        DataError: ``out`` is a file.
+    """
+    if out.exists() and not out.is_dir():
+        raise DataError(f"--out {out} is a file; name a folder")
+    if fresh:
+        shutil.rmtree(out / "pairs", ignore_errors=True)
+
+
+def run_and_save(
+    conditions: list[Condition],
+    policies: Mapping[str, str],
+    out: Path,
+    words: Sequence[str],
+    title: str,
+    ratios: bool,
+    figure: Callable[[StudyResults], bytes | None],
+) -> int:
+    """Drive a study, print its tables, write its files.
+
+    Args:
+        conditions: Parts of the study.
+        policies: Name or file by label.
+        out: Folder.
+        words: The command line.
+        title: Of the table of J.
+        ratios: Whether J over that under the first condition stands in it.
+        figure: Draws the study; None where there is nothing to draw.
+
+    Returns:
+        Exit status: 1 if a drive failed.
+    """
+    count = sum(len(condition.maneuvers) for condition in conditions) * len(policies)
+    with suite_progress(count) as advance:
+        outcome = run_study(conditions, policies, out, advance)
+    results = results_of(conditions, list(policies), outcome, words)
+    results.save_json(out / "study.json")
+    results.save_csv(out / "study.csv")
+    save_markdown(matrix_table(results, title, ratios), out / "study.md")
+    image = figure(results)
+    if image is not None:
+        write_bytes(out / "study.png", image)
+    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
+    print_study(console, results, title, ratios)
+    console.print(
+        f"{outcome.driven} of {count} drives driven now; everything is in {out}",
+        highlight=False,
+        markup=False,
+    )
+    return 1 if results.failures else 0
+
+
+def results_of(
+    conditions: Sequence[Condition], policies: Sequence[str], outcome: StudyOutcome, words: Sequence[str]
+) -> StudyResults:
+    """The results of an outcome, with what made them."""
+    criteria = Criteria()
+    return StudyResults(
+        schema=SCHEMA,
+        command=join(words),
+        created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        versions=versions(),
+        conditions={condition.name: condition.description for condition in conditions},
+        policies=tuple(policies),
+        maneuvers=common_maneuvers(outcome.metrics),
+        summaries=summarise(outcome.metrics, criteria),
+        left_out=outcome.left_out,
+        failures=tuple(outcome.failures),
+        metrics=outcome.metrics,
+        notes=outcome.notes,
+        criteria=criteria,
+    )

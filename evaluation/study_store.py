@@ -1,0 +1,122 @@
+"""Drives of a study that are done, in files: one a condition and policy."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..envs.car import Car
+from ..envs.cues import CueTrace
+from ..envs.errors import DataError
+from ..envs.platform import Platform
+from ..envs.settings import configuration, from_dict, to_dict
+from ..envs.storage import write_text
+from .file_names import plain_name
+from .metrics import Metrics
+from .provenance import package_version
+
+
+@configuration
+class KeptDrive:
+    """One drive.
+
+    Args:
+        key: Of everything that made it what it is; see :func:`drive_key`.
+        metrics: What it came to.
+        notes: What the policy counted.
+    """
+
+    key: str
+    metrics: Metrics
+    notes: dict[str, str]
+
+
+@configuration
+class KeptPair:
+    """The drives of one policy under one condition.
+
+    Args:
+        condition: Name of the condition.
+        policy: Name of the policy.
+        drives: By maneuver.
+    """
+
+    condition: str
+    policy: str
+    drives: dict[str, KeptDrive]
+
+
+class PairStore:
+    """Keeps the drives of one policy under one condition.
+
+    Args:
+        folder: Of the study; the files lie in ``pairs`` in it.
+        condition: Name of the condition.
+        policy: Name of the policy.
+    """
+
+    def __init__(self, folder: Path, condition: str, policy: str) -> None:
+        tag = hashlib.sha256(f"{condition}\n{policy}".encode()).hexdigest()[:6]
+        name = f"{plain_name(condition)}--{plain_name(policy)}-{tag}.json"
+        self._path = folder / "pairs" / name
+        self._pair = self._load(condition, policy)
+
+    def _load(self, condition: str, policy: str) -> KeptPair:
+        if not self._path.exists():
+            return KeptPair(condition, policy, {})
+        try:
+            values = json.loads(self._path.read_text(encoding="utf-8"))
+            return from_dict(KeptPair, values, str(self._path))
+        except (OSError, ValueError) as error:
+            raise DataError(f"{self._path}: cannot be read ({error}); delete it, or add --fresh") from None
+
+    def find(self, maneuver: str, key: str) -> KeptDrive | None:
+        """A drive that is done, if nothing about it has changed."""
+        kept = self._pair.drives.get(maneuver)
+        return kept if kept is not None and kept.key == key else None
+
+    def keep(self, maneuver: str, drive: KeptDrive) -> None:
+        """Write a drive down at once, whole or not at all."""
+        self._pair.drives[maneuver] = drive
+        write_text(self._path, json.dumps(to_dict(self._pair), allow_nan=False) + "\n")
+
+
+def identity(name: str, policy: Any) -> dict[str, Any]:
+    """What a policy is, as plain values: its name or the content of its file, and its parameters."""
+    path = Path(name)
+    parameters = getattr(policy, "parameters", None)
+    return {
+        "name": name,
+        "file": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
+        "parameters": None if parameters is None else to_dict(parameters),
+    }
+
+
+def drive_key(
+    platform: Platform, car: Car, about: Mapping[str, Any], policy: Mapping[str, Any], cues: CueTrace
+) -> str:
+    """A hash of all that makes a drive what it is.
+
+    The version of the package is in it, changes to its code within a version are not.
+
+    Args:
+        platform: The machine.
+        car: The car.
+        about: Of the condition.
+        policy: Of :func:`identity`.
+        cues: The drive.
+    """
+    whole = {
+        "version": package_version(),
+        "platform": to_dict(platform),
+        "car": to_dict(car),
+        "about": dict(about),
+        "policy": dict(policy),
+    }
+    digest = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
+    for array in (cues.time, cues.specific_force, cues.angular_velocity, cues.angular_acceleration):
+        digest.update(array.tobytes())
+    return digest.hexdigest()

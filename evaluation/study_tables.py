@@ -1,0 +1,89 @@
+"""The tables of a study."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+
+from .share import Share
+from .study_results import StudyResults, Summary
+from .tables import SHARE_HEADER, has_shares, share_cells
+from .text_table import NOTHING, TextTable, degrees, number, percent, print_table
+
+
+def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
+    """J of every policy under every condition.
+
+    Args:
+        results: The study.
+        title: Above the table.
+        ratios: Whether J over that under the first condition stands beside it.
+    """
+    rows = []
+    for policy in results.policies:
+        cells = [_cell(results, condition, policy, ratios) for condition in results.conditions]
+        rows.append((policy, *cells))
+    about = f"{title}: J, mean over {len(results.maneuvers)} drives"
+    return TextTable(about, ("policy", *results.conditions), tuple(rows))
+
+
+def _cell(results: StudyResults, condition: str, policy: str, ratios: bool) -> str:
+    found = results.summaries.get(condition, {}).get(policy)
+    if found is None:
+        return "left out" if policy in results.left_out.get(condition, {}) else NOTHING
+    first = condition == next(iter(results.conditions))
+    if not ratios or first or found.ratio is None:
+        return number(found.cue_error)
+    return f"{number(found.cue_error)} (×{found.ratio:.2f})"
+
+
+def condition_table(results: StudyResults, condition: str) -> TextTable:
+    """Every policy under one condition, best first; those left out are missing."""
+    found = results.summaries.get(condition, {})
+    gaps = {name: Share(s.share, s.perceived_share) for name, s in found.items()}
+    shown = has_shares(gaps.values())
+    order = sorted(found, key=lambda name: found[name].cue_error)
+    header = (
+        "policy",
+        "J",
+        "perceived J",
+        *(SHARE_HEADER if shown else ()),
+        f"J over {next(iter(results.conditions))}",
+        "false cues %",
+        "tilt rate peak deg/s",
+        "at a limit %",
+        "worst drive %",
+    )
+    rows = (_row(name, found[name], share_cells(gaps[name]) if shown else ()) for name in order)
+    title = f"{condition}: {results.conditions[condition]}"
+    return TextTable(title, header, tuple(rows), (0,) if order else ())
+
+
+def _row(name: str, s: Summary, shares: tuple[str, ...]) -> tuple[str, ...]:
+    return (
+        name,
+        number(s.cue_error),
+        number(s.perceived_cue_error),
+        *shares,
+        NOTHING if s.ratio is None else f"{s.ratio:.2f}",
+        percent(s.false_cues),
+        degrees(s.tilt_rate_peak),
+        percent(s.at_limit),
+        percent(s.most_limited),
+    )
+
+
+def print_study(console: Console, results: StudyResults, title: str, ratios: bool) -> None:
+    """Show a table a condition, the matrix of J, and what was left out or failed."""
+    for condition in results.conditions:
+        print_table(console, condition_table(results, condition))
+    print_table(console, matrix_table(results, title, ratios))
+    for condition, policies in results.left_out.items():
+        for policy, reason in policies.items():
+            who = f"{escape(policy)}, {escape(condition)}"
+            console.print(f"[bold]left out[/bold] {who}: {escape(reason)}", highlight=False)
+    for failure in results.failures:
+        who = ", ".join(part for part in (failure.condition, failure.policy, failure.maneuver) if part)
+        console.print(
+            f"[bold red]failed[/bold red] {escape(who)}: {escape(failure.message)}", highlight=False
+        )
