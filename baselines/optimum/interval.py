@@ -63,14 +63,14 @@ def interval(
     Args:
         machine: The machine.
         options: Zones, and the number of steps.
-        sensed: The filter to put errors through at the head; None for J.
+        sensed: The filter to put errors through; None to take them as they are.
         dt: Time step of the machine, s.
     """
     q, v, a, b = (cs.SX.sym(name, N_AXES) for name in "qvab")
     x = cs.SX.sym("x", 0 if sensed is None else len(sensed.a))
     wanted = cs.SX.sym("wanted", N_CUES + 1, options.steps)
     cab = machine.platform.cab
-    point = cs.DM(cab.reference_point) + (0.0 if sensed is None else cs.DM(cab.head))
+    point = cs.DM(cab.reference_point) + (0.0 if options.objective == "J" else cs.DM(cab.head))
     zones = cs.DM([options.force_zone] * 3 + [options.rate_zone] * 3)
     position, rate, memory, errors = q, v, x, []
     for k in range(options.steps):

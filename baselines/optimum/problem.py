@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -44,6 +44,7 @@ class Solution:
     """What IPOPT came to.
 
     Args:
+        nodes: (intervals + 1, node_size) variables.
         accelerations: (n, 9) of every time step of the window.
         costs: (intervals,) sum of squared errors of the samples of each.
         converged: Whether it is a minimum.
@@ -51,6 +52,7 @@ class Solution:
         status: IPOPT's word for how it ended.
     """
 
+    nodes: Floats
     accelerations: Floats
     costs: Floats
     converged: bool
@@ -83,11 +85,11 @@ class Parts(NamedTuple):
 
 @lru_cache(maxsize=8)
 def _parts(
-    platform: Platform, options: OptimumOptions, vestibular: VestibularModel, dt: float, margin: float
+    platform: Platform, options: OptimumOptions, vestibular: VestibularModel | None, dt: float, margin: float
 ) -> Parts:
-    """Made once for all drives on a machine."""
+    """Made once for all drives on a machine; without a filter if there is no model of perception."""
     machine = SymbolicMachine(platform)
-    sensed = sensed_error(vestibular, dt) if options.objective == "perceived" else None
+    sensed = None if vestibular is None else sensed_error(vestibular, dt)
     part = interval(machine, options, sensed, dt)
     limits = node_limits(machine, part.q, part.v, part.a, options.steps * dt, options.margin, widened=margin)
     return Parts(blocks_of(part, limits, options), limits.lower, limits.upper)
@@ -99,7 +101,7 @@ class Problem:
     Args:
         platform: The machine.
         options: What to minimise, and how.
-        vestibular: The driver's perception.
+        vestibular: The driver's perception; None to take errors as they are.
         dt: Time step of the machine, s.
         margin: Share of the limits of speed and acceleration to keep free.
         tell: Called with IPOPT's iterations so far.
@@ -109,7 +111,7 @@ class Problem:
         self,
         platform: Platform,
         options: OptimumOptions,
-        vestibular: VestibularModel,
+        vestibular: VestibularModel | None,
         dt: float,
         margin: float,
         tell: Tell | None = None,
@@ -119,8 +121,10 @@ class Problem:
         self._machine = SymbolicMachine(platform)
         self._watch = Watch(tell)
         self.sensed: SensedError | None = None
-        if options.objective == "perceived":
+        self._plain: Problem | None = None
+        if vestibular is not None:
             self.sensed = sensed_error(vestibular, dt)
+            self._plain = Problem(platform, options, None, dt, margin, tell)
         self._transcriptions: dict[int, Transcription] = {}
 
     @cached_property
@@ -143,18 +147,18 @@ class Problem:
         program = self._transcription(count)
         lower, upper = self._bounds(count, start)
         least, most = self._ranges(program)
+        guess, before = self._guess(wanted, given, count, start)
         with self._watch.solving():
-            result = program.solver(
-                x0=self._guess(count, start), p=given, lbx=lower, ubx=upper, lbg=least, ubg=most
-            )
+            result = program.solver(x0=guess, p=given, lbx=lower, ubx=upper, lbg=least, ubg=most)
         stats = program.solver.stats()
         x = np.array(result["x"])[:, 0]
         nodes = x.reshape(count + 1, -1)
         return Solution(
+            nodes,
             mean_accelerations(nodes[:, -N_AXES:], self.options.steps)[: len(wanted)],
             program.shares(x, given)[0] * self.options.steps,
             stats["return_status"] in _CONVERGED,
-            int(stats["iter_count"]),
+            int(stats["iter_count"]) + before,
             str(stats["return_status"]),
         )
 
@@ -168,7 +172,7 @@ class Problem:
         return {
             "tol": options.tolerance,
             "max_iter": options.iterations,
-            "mu_init": max(10.0 * options.barrier, 1e-2),
+            "mu_init": 10.0 * options.barrier,
             "mu_target": options.barrier,
             "linear_solver": "mumps",
             **_ACCEPTABLE,
@@ -181,11 +185,25 @@ class Problem:
         rows[: len(wanted), N_CUES] = 1.0
         return rows.ravel()
 
-    def _guess(self, count: int, start: Start) -> Floats:
-        """Standing still."""
+    def _guess(self, wanted: Floats, given: Floats, count: int, start: Start) -> tuple[Floats, int]:
+        """A motion without gaps, and the iterations it took.
+
+        Standing still for errors as they are. What is sensed begins with the plan for those: from far off,
+        its long memory would bend the way of the iterations.
+        """
         nodes = np.zeros((count + 1, self._parts.blocks.node_size))
         nodes[:, :N_AXES] = start.position
-        return nodes.ravel()
+        if self._plain is None:
+            return nodes.ravel(), 0
+        plain = self._plain.solve(wanted, replace(start, memory=np.zeros(0)))
+        nodes[:, : 2 * N_AXES], nodes[:, -N_AXES:] = np.split(plain.nodes, [2 * N_AXES], axis=1)
+        nodes[0, 2 * N_AXES : -N_AXES] = start.memory
+        rows = given.reshape(count, self.options.steps, N_CUES + 1)
+        for k in range(count):
+            z = np.concatenate([nodes[k], nodes[k + 1, -N_AXES:]])
+            end = np.array(self._parts.blocks.end(z, rows[k].T))[:, 0]
+            nodes[k + 1, 2 * N_AXES : -N_AXES] = end[2 * N_AXES :]
+        return nodes.ravel(), plain.iterations
 
     def _bounds(self, count: int, start: Start) -> tuple[Floats, Floats]:
         """Of the variables: the start is given, carriage and turntable have limits of their own."""

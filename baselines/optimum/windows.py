@@ -98,7 +98,8 @@ class Planner:
 
         @cache
         def problem(margin: float) -> Problem:
-            return Problem(platform, options, vestibular, cues.dt, margin, told if tell else None)
+            filtered = vestibular if options.objective == "perceived" else None
+            return Problem(platform, options, filtered, cues.dt, margin, told if tell else None)
 
         self._problem = problem
 

@@ -88,7 +88,7 @@ def test_no_short_detour_within_the_limits_is_better(braking):
 
 def test_a_finer_grid_and_longer_legs_are_better(braking):
     drive, plan, _ = braking
-    coarser = Optimum(options=replace(COARSE, steps=25)).plan(drive).account
+    coarser = Optimum(options=replace(COARSE, steps=10)).plan(drive).account
     assert plan.account.played < coarser.played
     paper = get_platform("paper")
     longer = replace(paper, hexapod=replace(paper.hexapod, extension=(-0.8, 0.8)))
