@@ -128,7 +128,7 @@ SMALL = 1e-5
 """m/s^2, rad/s: so small that turning and tilting are linear to one part in a million."""
 OMEGA = 2.0 * np.pi
 """rad/s; a whole number of samples is a period."""
-TIME = np.arange(6001) * DT
+TIME = np.arange(3001) * DT
 
 
 @cache
@@ -163,26 +163,91 @@ def respond(channel: int, of: str, where: int) -> complex:
     return complex(2.0j * np.mean(acceleration * phase) / SMALL)
 
 
-@pytest.mark.parametrize(
-    ("channel", "of", "where", "filter_", "output", "input_"),
-    [
-        (0, "cab", 0, "surge", 1, 1),
-        (0, "tilt_rate", 1, "surge", 0, 1),
-        (4, "tilt_rate", 1, "surge", 0, 0),
-        (1, "cab", 1, "sway", 1, 1),
-        (1, "tilt_rate", 0, "sway", 0, 1),
-        (2, "cab", 2, "heave", 0, 0),
-        (5, "beta_hp_rate", 2, "yaw", 0, 0),
-    ],
-)
-def test_the_running_policy_has_the_frequency_response_of_the_design(
+CASES = [
+    (0, "cab", 0, "surge", 1, 1),
+    (0, "tilt_rate", 1, "surge", 0, 1),
+    (4, "tilt_rate", 1, "surge", 0, 0),
+    (1, "cab", 1, "sway", 1, 1),
+    (1, "tilt_rate", 0, "sway", 0, 1),
+    (2, "cab", 2, "heave", 0, 0),
+    (5, "beta_hp_rate", 2, "yaw", 0, 0),
+]
+MOVES = {
+    "surge": ((6, 7, 1), (8, 9, 0)),
+    "sway": ((6, 7, 1), (8, 9, 0)),
+    "heave": ((3, 4, 0),),
+    "yaw": ((3, 4, 0),),
+}
+"""Position, velocity and acceleration: indices of states and of the output that moves them."""
+
+
+def sampled(channel: str) -> tuple[np.ndarray, ...]:
+    """The filter as it runs: the machine under it moves with constant acceleration within a step."""
+    f = discrete(getattr(design(OPEN), channel).filter, DT)
+    a, b = f.a.copy(), f.b.copy()
+    for x, v, u in MOVES[channel]:
+        unit = np.eye(len(a))
+        a[v], b[v] = unit[v] + DT * f.c[u], DT * f.d[u]
+        a[x], b[x] = unit[x] + DT * unit[v] + 0.5 * DT**2 * f.c[u], 0.5 * DT**2 * f.d[u]
+    return a, b, f.c, f.d
+
+
+def response(system: tuple[np.ndarray, ...], z: complex) -> np.ndarray:
+    """C (z - A)^-1 B + D; scipy.signal.dfreqresp goes by polynomials, too coarse with poles so near 1."""
+    a, b, c, d = system
+    return c @ np.linalg.solve(z * np.eye(len(a)) - a, b) + d
+
+
+@pytest.mark.parametrize(("channel", "of", "where", "filter_", "output", "input_"), CASES)
+def test_the_running_policy_has_the_frequency_response_of_its_filter(
     channel, of, where, filter_, output, input_
 ):
-    """The bilinear transform is exact at the warped frequency 2/T tan(wT/2): by scipy.signal.freqresp."""
+    expected = response(sampled(filter_), np.exp(1j * OMEGA * DT))[output, input_]
+    assert respond(channel, of, where) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(("channel", "of", "where", "filter_", "output", "input_"), CASES)
+def test_the_running_policy_is_the_designed_filter_but_for_the_time_step(
+    channel, of, where, filter_, output, input_
+):
+    """Against scipy.signal.freqresp of the continuous filter, at 1 Hz and 100 steps a second."""
     f = getattr(design(OPEN), filter_).filter
     single = f.a, f.b[:, [input_]], f.c[[output]], f.d[[output]][:, [input_]]
-    _, expected = signal.freqresp(single, w=[2.0 / DT * np.tan(0.5 * OMEGA * DT)])
-    assert respond(channel, of, where) == pytest.approx(expected[0], rel=1e-6)
+    _, expected = signal.freqresp(single, w=[OMEGA])
+    assert respond(channel, of, where) == pytest.approx(expected[0], rel=OMEGA * DT)
+
+
+@pytest.mark.parametrize("channel", ["surge", "sway", "heave", "yaw"])
+def test_the_sampled_filter_comes_nearer_to_the_design_with_the_time_step(channel):
+    f = getattr(design(OPEN), channel).filter
+    single = f.a, f.b[:, [0]], f.c[[0]], f.d[[0]][:, [0]]
+    _, exact = signal.freqresp(single, w=[2.0])
+    errors = []
+    for dt in (1e-4, 1e-5):
+        s = discrete(f, dt)
+        found = response((s.a, s.b, s.c, s.d), np.exp(2.0j * dt))[0, 0]
+        errors.append(abs(found - exact[0]) / abs(exact[0]))
+    assert errors[0] < 1e-3
+    assert errors[1] < 0.11 * errors[0] + 1e-7
+
+
+def test_no_design_rings_and_none_runs_away_at_the_limits():
+    """Loops faster than the time step, noise, and limits met most of the time."""
+    rng = np.random.default_rng(1)
+    time = np.arange(1501) * DT
+    force, rate = 3.0 * rng.standard_normal((len(time), 3)), 0.3 * rng.standard_normal((len(time), 3))
+    force[:, 0] += 5.0 * np.sin(1.1 * time)
+    force[:, 2] -= 9.81
+    drive = CueTrace("noise", time, force, rate)
+    corners = [rng.integers(0, 2, len(SPACE)).astype(float) for _ in range(20)]
+    sets = [SPACE.decode(place) for place in (*corners, *rng.random((10, len(SPACE))))]
+    scores = WashoutBatch(sets, [drive], PAPER, OPTIMAL).scores()
+    assert np.isfinite(scores.cue_error).all()
+    assert scores.at_limit.max() > 0.5
+    for parameters in sets:
+        solved = design(parameters)
+        poles = [np.linalg.eigvals(discrete(getattr(solved, c).filter, DT).a) for c in MOVES]
+        assert min(np.real(p).min() for p in poles) > -0.05
 
 
 def test_what_is_felt_is_the_acceleration_and_gravity_in_the_tilted_cab():
