@@ -20,8 +20,8 @@ from .plan import Plan
 from .progress import SolveProgress
 from .windows import Planner
 
-_SAME: Final = 1e-9
-"""Largest difference of two poses taken for one, m and rad."""
+_SAME: Final = 1e-3
+"""Largest difference of two poses taken for one, m and rad: less than plans keep from the limits."""
 
 
 class Optimum:
