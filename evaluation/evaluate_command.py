@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..envs.car import Car
     from ..envs.platform import Platform
 
-_PLAIN_WIDTH: Final = 160
+_PLAIN_WIDTH: Final = 180
 """Columns of the tables where the output is no terminal."""
 
 Name = Annotated[str, arg(metavar="NAME|FILE")]

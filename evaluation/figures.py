@@ -24,6 +24,8 @@ _CUES = (
     ("Yaw rate", "deg/s", np.degrees(1.0)),
 )
 _LEGS = slice(2, 8)
+_LINE = 0.075
+"""Height of a number beside the panels, as a share of a panel's."""
 
 Drives = Mapping[str, Trajectory]
 Styles = Mapping[str, Mapping[str, Any]]
@@ -56,7 +58,8 @@ def maneuver_figure(
         first = next(iter(drives.values()))
         title = f"{first.maneuver} (car {first.car}, motion base {first.platform})"
         figure.suptitle(title, fontsize=13, x=0.01, ha="left")
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=7, fontsize=9)
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 7), fontsize=9)
         return png(figure)
 
 
@@ -147,6 +150,14 @@ def _limit_activity(axes: Axes, drives: Drives, styles: Styles) -> None:
     _label(axes, "Actuators at a limit", f"of {len(ACTUATORS)}")
 
 
+def _spread(heights: list[float], least: float) -> list[float]:
+    """Heights moved up as far as they must be to lie apart, in the same order."""
+    moved: dict[int, float] = {}
+    for i in sorted(range(len(heights)), key=heights.__getitem__):
+        moved[i] = max(heights[i], max(moved.values(), default=-1.0) + least)
+    return [moved[i] for i in range(len(heights))]
+
+
 def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> None:
     """The cue error gathered so far; its last value is J, and beside it the share of the gap."""
     ends: dict[str, float] = {}
@@ -157,9 +168,12 @@ def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> No
     baseline, optimum = (
         ends.get(name) for name in (criteria.references.baseline, criteria.references.optimum)
     )
-    for name, end in ends.items():
-        share = gap_share(end, baseline, optimum)
-        text = f" {end:.2f}" if share is None else f" {end:.2f} ({share:.2f})"
-        axes.annotate(text, (drives[name].time[-1], end), color=styles[name]["color"], fontsize=8)
     axes.set_ylim(bottom=0.0)
-    _label(axes, "Cue error up to now (ends at J)", "J")
+    heights = _spread([end / axes.get_ylim()[1] for end in ends.values()], _LINE)
+    for (name, end), height in zip(ends.items(), heights, strict=True):
+        share = gap_share(end, baseline, optimum)
+        text = f"{end:.2f}" if share is None else f"{end:.2f} ({share:.2f})"
+        style = {"color": styles[name]["color"], "fontsize": 8, "va": "center"}
+        axes.annotate(text, (1.01, height), xycoords="axes fraction", annotation_clip=False, **style)
+    shares = "J" if baseline is None or optimum is None else "J, share of the gap in brackets"
+    _label(axes, f"Cue error up to now, to {shares}", "J")

@@ -16,6 +16,9 @@ from ..envs.storage import write_text
 NOTHING: Final = "–"
 """Shown where a metric is undefined."""
 
+_LONGEST_NAME: Final = 40
+"""Characters of a name that is shown whole, whatever the width."""
+
 
 @dataclass(frozen=True)
 class TextTable:
@@ -67,8 +70,11 @@ def microseconds(value: float | None) -> str:
 def print_table(console: Console, table: TextTable) -> None:
     """Show a table on a terminal."""
     shown = Table(title=escape(table.title), title_justify="left", title_style="bold", header_style="dim")
+    # Names are what a reader looks for: they are never cut, as long as they are names.
+    names = min(max((len(row[0]) for row in table.rows), default=0), _LONGEST_NAME)
     for i, name in enumerate(table.header):
-        shown.add_column(escape(name), justify="left" if i == 0 else "right")
+        left = {"justify": "left", "min_width": names} if i == 0 else {"justify": "right"}
+        shown.add_column(escape(name), **left)
     for i, row in enumerate(table.rows):
         shown.add_row(*(escape(cell) for cell in row), style="bold" if i in table.best else "")
     console.print(shown)

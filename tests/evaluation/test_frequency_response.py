@@ -162,6 +162,26 @@ def test_a_policy_that_knows_the_drive_has_no_delay():
     assert found.response("f_z", "f_z")[0] == pytest.approx(0.5, abs=1e-3)
 
 
+class Alone:
+    """A washout that is driven as one that is told the drive: by itself."""
+
+    name = "alone"
+
+    def for_drive(self, cues):
+        return ClassicalWashout("classical")
+
+
+def test_a_batch_gives_what_each_drive_gives_alone():
+    test = FrequencyTest(frequencies=(9.0,), settling=1.0, window=1.0)
+    together = frequency_response(ClassicalWashout("classical"), PAPER, test)
+    alone = frequency_response(Alone(), PAPER, test)
+    for axis in CUE_AXES:
+        for felt in CUE_AXES:
+            np.testing.assert_allclose(
+                together.response(axis, felt), alone.response(axis, felt), rtol=1e-9, atol=1e-12
+            )
+
+
 def test_an_agent_is_tested_in_its_own_environment():
     test = FrequencyTest(frequencies=(1.0,), settling=6.0, settling_periods=1.0, window=6.0)
     found = frequency_response(make_policy("learned-preview", PAPER), PAPER, test, ("f_y",))

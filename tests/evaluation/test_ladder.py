@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from motion_cueing.evaluation.criteria import Criteria, References
-from motion_cueing.evaluation.figures import maneuver_figure
+from motion_cueing.evaluation.figure_style import line_styles, new_figure
+from motion_cueing.evaluation.figures import _error
 from motion_cueing.evaluation.ladder import ALL_RUNGS, LADDER, ladder_names, rungs
 from motion_cueing.evaluation.ladder_figure import ladder_figure
 from motion_cueing.evaluation.ladder_table import ladder_table, save_ladder
@@ -183,5 +185,10 @@ def test_one_policy_makes_no_ladder():
 
 def test_a_figure_of_a_maneuver_shows_the_share():
     drives = {name: drive(gain, policy=name) for name, gain in GAINS.items()}
-    without = {name: one for name, one in drives.items() if name != "optimum"}
-    assert maneuver_figure(drives, list(GAINS)) != maneuver_figure(without, list(GAINS))
+    axes = new_figure(4.0, 3.0).subplots()
+    _error(axes, drives, line_styles(list(drives)), Criteria())
+    texts = [text.get_text() for text in axes.texts]
+    assert texts[list(GAINS).index("classical-tuned")].endswith("(0.00)")
+    assert texts[list(GAINS).index("optimum")].endswith("(1.00)")
+    heights = sorted(text.xy[1] for text in axes.texts)
+    assert min(np.diff(heights)) > 0.07
