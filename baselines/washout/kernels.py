@@ -29,6 +29,16 @@ class Score:
     at_limit: real  # share of the steps in which a limit is met
 
 
+@wp.func
+def mean_score(cue_error: real, perceived_error: real, limited: real, count: real) -> Score:
+    """A score of sums over ``count`` samples."""
+    result = Score()
+    result.cue_error = cue_error / count
+    result.perceived_error = perceived_error / count
+    result.at_limit = limited / count
+    return result
+
+
 def predict_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
     """A kernel: accelerations for a batch of observations; memories begin anew where an episode has begun.
 
@@ -102,11 +112,7 @@ def drive_kernel(Parameters: Any, begin: Any, step: Any) -> Any:
             perceived = perceived + perceived_error(z, state)
             if state.limits != wp.uint64(0):
                 limited = limited + real(1.0)
-        result = Score()
-        result.cue_error = cue / real(count)
-        result.perceived_error = perceived / real(count)
-        result.at_limit = limited / real(count)
-        score[i] = result
+        score[i] = mean_score(cue, perceived, limited, real(count))
 
     return drive_through
 
