@@ -20,6 +20,7 @@ from .linearisation import Floats
 from .parameters import MpcParameters
 from .planner import Planned, Planner
 from .solver import Rows
+from .threads import OneThread
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,7 @@ class PredictiveController:
         self._forecast = Forecaster(planner.grid, parameters.forecast, cues)
         self._brakes = Brakes(platform)
         self._counts = Counts()
+        self._one_thread = OneThread()
 
     @property
     def notes(self) -> Mapping[str, str]:
@@ -139,10 +141,11 @@ class PredictiveController:
         if begins.all():
             self._counts = Counts()
         known = [None] * len(rows) if state is None else state
-        answers = [
-            self._act(row, None if begin else memory)
-            for row, begin, memory in zip(rows, begins, known, strict=True)
-        ]
+        with self._one_thread():
+            answers = [
+                self._act(row, None if begin else memory)
+                for row, begin, memory in zip(rows, begins, known, strict=True)
+            ]
         actions = np.array([action for action, _ in answers]).reshape(*np.shape(observation)[:-1], N_AXES)
         return actions, [memory for _, memory in answers]
 
