@@ -83,7 +83,7 @@ $(BIN)/python:
 
 $(BASE): pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing into $(VENV)"
-	@$(PIP) -e .
+	@$(PIP) -e '.[optimal]'
 	@touch $@
 
 $(DEV): pyproject.toml constraints.txt | $(BIN)/python
