@@ -6,8 +6,9 @@ import math
 from pathlib import Path
 from typing import Final, Literal
 
-from ...envs.errors import ConfigurationError, UnknownNameError
-from ...envs.settings import NonNegative, Positive, Vector2, configuration, load
+from ...envs.errors import ConfigurationError
+from ...envs.settings import NonNegative, Positive, Vector2, configuration
+from ..presets import load_preset, preset_names
 from ..washout import WashoutParameters
 
 Speeds = tuple[NonNegative, NonNegative, NonNegative]
@@ -69,7 +70,7 @@ _PRESETS: Final = Path(__file__).parent / "presets"
 
 def adaptive_presets() -> list[str]:
     """Names of the shipped parameter sets."""
-    return sorted(path.stem for path in _PRESETS.glob("*.yaml"))
+    return preset_names(_PRESETS)
 
 
 def load_adaptive(name: str | Path) -> AdaptiveParameters:
@@ -80,9 +81,4 @@ def load_adaptive(name: str | Path) -> AdaptiveParameters:
         DataError: the file cannot be read.
         ConfigurationError: a field of it is wrong.
     """
-    path = Path(name)
-    if path.suffix in (".yaml", ".yml"):
-        return load(AdaptiveParameters, path)
-    if str(name) not in adaptive_presets():
-        raise UnknownNameError("adaptive washout preset", str(name), adaptive_presets())
-    return load(AdaptiveParameters, _PRESETS / f"{name}.yaml")
+    return load_preset(AdaptiveParameters, "adaptive washout preset", name, _PRESETS)

@@ -8,9 +8,9 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from ...envs.errors import UnknownNameError
 from ...envs.perception import get_vestibular_model
-from ...envs.settings import Positive, Vector2, Vector3, configuration, load
+from ...envs.settings import Positive, Vector2, Vector3, configuration
+from ..presets import load_preset, preset_names
 from ..washout import LowPass
 from ..washout.parameters import Limits, Share
 
@@ -134,7 +134,7 @@ _PRESETS: Final = Path(__file__).parent / "presets"
 
 def optimal_presets() -> list[str]:
     """Names of the shipped parameter sets."""
-    return sorted(path.stem for path in _PRESETS.glob("*.yaml"))
+    return preset_names(_PRESETS)
 
 
 def load_optimal(name: str | Path) -> OptimalParameters:
@@ -145,9 +145,4 @@ def load_optimal(name: str | Path) -> OptimalParameters:
         DataError: the file cannot be read.
         ConfigurationError: a field of it is wrong.
     """
-    path = Path(name)
-    if path.suffix in (".yaml", ".yml"):
-        return load(OptimalParameters, path)
-    if str(name) not in optimal_presets():
-        raise UnknownNameError("optimal washout preset", str(name), optimal_presets())
-    return load(OptimalParameters, _PRESETS / f"{name}.yaml")
+    return load_preset(OptimalParameters, "optimal washout preset", name, _PRESETS)

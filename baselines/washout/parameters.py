@@ -8,8 +8,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from ...envs.errors import UnknownNameError
-from ...envs.settings import Positive, Vector2, Vector3, configuration, load
+from ...envs.settings import Positive, Vector2, Vector3, configuration
+from ..presets import load_preset, preset_names
 
 Frequency = Annotated[float, Field(ge=0.0, le=100.0)]
 Limits = tuple[Positive, Positive, Positive]
@@ -111,7 +111,7 @@ _PRESETS: Final = Path(__file__).parent / "presets"
 
 def washout_presets() -> list[str]:
     """Names of the shipped parameter sets."""
-    return sorted(path.stem for path in _PRESETS.glob("*.yaml"))
+    return preset_names(_PRESETS)
 
 
 def load_washout(name: str | Path) -> WashoutParameters:
@@ -122,9 +122,4 @@ def load_washout(name: str | Path) -> WashoutParameters:
         DataError: the file cannot be read.
         ConfigurationError: a field of it is wrong.
     """
-    path = Path(name)
-    if path.suffix in (".yaml", ".yml"):
-        return load(WashoutParameters, path)
-    if str(name) not in washout_presets():
-        raise UnknownNameError("washout preset", str(name), washout_presets())
-    return load(WashoutParameters, _PRESETS / f"{name}.yaml")
+    return load_preset(WashoutParameters, "washout preset", name, _PRESETS)
