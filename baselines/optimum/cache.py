@@ -27,7 +27,7 @@ from ...envs.storage import write_bytes
 from .options import OptimumOptions
 from .plan import Account, Plan
 
-FORMULATION: Final = 2
+FORMULATION: Final = 3
 """Version of the program: what changes its solutions raises it."""
 
 

@@ -28,8 +28,8 @@ class OptimumOptions:
         effort: Weight of the machine's own motion, so that axes that do the same share it. Raise it and the
             machine stays nearer to neutral, with a higher J.
         margin: Share of the limits of speed and acceleration that is left free between nodes.
-        widenings: How often a plan that meets a limit between nodes is solved anew, with three times the
-            margin each time.
+        widenings: How often a plan that meets a limit between nodes is solved anew: with three times the
+            margin, or, where it came near a singular pose, clear of those.
         barrier: Weight of IPOPT's logarithmic barrier at the end. Lower it and plans come nearer to the
             limits, with a J lower by a percent at most and more iterations.
         tolerance: Of IPOPT: largest violation of the conditions of a minimum.

@@ -22,7 +22,7 @@ class Account:
         played: The same, of the plan played through the machine's step.
         windows: How many the drive was solved in.
         iterations: IPOPT's, of all windows and their repetitions.
-        widened: Windows solved anew with a wider margin, as the plan met a limit between nodes.
+        widened: Times a window was solved anew, as the plan met a limit between nodes or a singular pose.
         unconverged: Windows that ended without a minimum.
         braked: Windows without a plan that keeps the limits, in which the machine came to a stop.
         seconds: Wall-clock time it took.

@@ -12,6 +12,7 @@ from ...envs.cues import CueTrace
 from ...envs.perception import VestibularModel
 from ...envs.platform import Platform
 from ...envs.platform.machines import UNITY
+from ...envs.platform.state import SINGULAR
 from ...envs.simulator import N_AXES, Simulator
 from ...envs.snapshot import Snapshot
 
@@ -34,6 +35,11 @@ class Played:
     accelerations: Floats
     clean: bool
     states: NDArray[Any]
+
+    @property
+    def singular(self) -> bool:
+        """Whether it was kept from a singular pose."""
+        return bool(np.any(self.states["limits"] & np.uint64(SINGULAR)))
 
 
 class Player:

@@ -85,13 +85,19 @@ class Parts(NamedTuple):
 
 @lru_cache(maxsize=8)
 def _parts(
-    platform: Platform, options: OptimumOptions, vestibular: VestibularModel | None, dt: float, margin: float
+    platform: Platform,
+    options: OptimumOptions,
+    vestibular: VestibularModel | None,
+    dt: float,
+    margin: float,
+    clear: bool,
 ) -> Parts:
     """Made once for all drives on a machine; without a filter if there is no model of perception."""
     machine = SymbolicMachine(platform)
     sensed = None if vestibular is None else sensed_error(vestibular, dt)
     part = interval(machine, options, sensed, dt)
-    limits = node_limits(machine, part.q, part.v, part.a, options.steps * dt, options.margin, widened=margin)
+    spacing = options.steps * dt
+    limits = node_limits(machine, part.q, part.v, part.a, spacing, options.margin, margin, clear)
     return Parts(blocks_of(part, limits, options), limits.lower, limits.upper)
 
 
@@ -104,6 +110,7 @@ class Problem:
         vestibular: The driver's perception; None to take errors as they are.
         dt: Time step of the machine, s.
         margin: Share of the limits of speed and acceleration to keep free.
+        clear: Whether to keep away from singular poses.
         tell: Called with IPOPT's iterations so far.
     """
 
@@ -114,9 +121,10 @@ class Problem:
         vestibular: VestibularModel | None,
         dt: float,
         margin: float,
+        clear: bool = False,
         tell: Tell | None = None,
     ) -> None:
-        self.options, self.dt, self.margin = options, dt, margin
+        self.options, self.dt, self.margin, self.clear = options, dt, margin, clear
         self._vestibular = vestibular
         self._machine = SymbolicMachine(platform)
         self._watch = Watch(tell)
@@ -124,13 +132,13 @@ class Problem:
         self._plain: Problem | None = None
         if vestibular is not None:
             self.sensed = sensed_error(vestibular, dt)
-            self._plain = Problem(platform, options, None, dt, margin, tell)
+            self._plain = Problem(platform, options, None, dt, margin, clear, tell)
         self._transcriptions: dict[int, Transcription] = {}
 
     @cached_property
     def _parts(self) -> Parts:
         machine, options = self._machine.platform, self.options
-        return _parts(machine, options, self._vestibular, self.dt, self.margin)
+        return _parts(machine, options, self._vestibular, self.dt, self.margin, self.clear)
 
     def solve(self, wanted: Floats, start: Start) -> Solution:
         """The best accelerations for a window.

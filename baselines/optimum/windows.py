@@ -1,7 +1,8 @@
 """A drive of any length in windows: each looks ahead beyond what is kept of it.
 
 The last window reaches to the end of the drive. Every plan is played through the machine's own step before
-it is taken; one that meets a limit between nodes is solved anew with a wider margin.
+it is taken; one that meets a limit between nodes is solved anew with a wider margin, one that comes near a
+singular pose with those forbidden.
 """
 
 from __future__ import annotations
@@ -97,9 +98,9 @@ class Planner:
                 tell(self._share, iterations)
 
         @cache
-        def problem(margin: float) -> Problem:
+        def problem(margin: float, clear: bool = False) -> Problem:
             filtered = vestibular if options.objective == "perceived" else None
-            return Problem(platform, options, filtered, cues.dt, margin, told if tell else None)
+            return Problem(platform, options, filtered, cues.dt, margin, clear, told if tell else None)
 
         self._problem = problem
 
@@ -135,8 +136,9 @@ class Planner:
         before, begins = self._player.snapshot(), self._begins()
         ahead = self._wanted[window.first + 1 : window.last + 1]
         length = window.kept - window.first
+        margin, clear = options.margin, False
         for attempt in range(options.widenings + 1):
-            solution = self._problem(options.margin * _WIDER**attempt).solve(ahead, begins)
+            solution = self._problem(margin, clear).solve(ahead, begins)
             tally.iterations += solution.iterations
             played = self._player.play(solution.accelerations[:length])
             if played.clean:
@@ -144,6 +146,10 @@ class Planner:
                 tally.cost += float(solution.costs[: -(-length // options.steps)].sum())
                 return played
             self._player.restore(before)
+            if played.singular and not clear:
+                clear = True
+            else:
+                margin *= _WIDER
             tally.widened += attempt < options.widenings
         tally.unconverged += not solution.converged
         tally.braked += 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import warp as wp
 
 from ..precision import mat65, real, vec3, vec9
@@ -17,6 +19,12 @@ ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "le
 
 AXES = ("carriage_x", "carriage_y", "surge", "sway", "heave", "roll", "pitch", "yaw", "turntable")
 """Names of the nine degrees of freedom an action commands, in its order."""
+
+END_OF_TRAVEL: Final = 0x111111111
+"""Bits of a step's limits that say an end of travel, one for each actuator."""
+
+SINGULAR: Final = 0x888888888
+"""Bits that say a nearly singular pose."""
 
 
 @wp.struct

@@ -9,7 +9,7 @@ import warp as wp
 from ..cue_cost import Zone, cue_error, perceived_error, zone
 from ..cues import GRAVITY
 from ..platform.parameters import UNLIMITED
-from ..platform.state import Machine
+from ..platform.state import END_OF_TRAVEL, SINGULAR, Machine
 from ..precision import real, vec3
 from ..state import State
 from .options import RewardOptions
@@ -28,12 +28,6 @@ TERMS: Final = (
 
 N_TERMS: Final = len(TERMS)
 vec_terms: Any = wp.types.vector(N_TERMS, real)
-
-END_OF_TRAVEL: Final = 0x111111111
-"""Bits of a step's limits that say an end of travel, one for each actuator."""
-
-SINGULAR: Final = 0x888888888
-"""Bits that say a nearly singular pose."""
 
 
 @wp.struct

@@ -48,3 +48,11 @@ def weaving(seconds: float, seed: int = 0, size: float = 1.0) -> CueTrace:
                 size * largest * rng.uniform(0.5, 1.0) * np.sin(2.0 * np.pi * frequency * time)
             )
     return drive_of(signals[:, :3], signals[:, 3:], name="weaving")
+
+
+def turning(seconds: float, rate: float) -> CueTrace:
+    """A yaw rate that sets in and stays, rad/s, with no force."""
+    time = DT * np.arange(round(seconds / DT) + 1)
+    rates = np.zeros((len(time), 3))
+    rates[:, 2] = rate * np.clip(time, 0.0, 1.0)
+    return drive_of(np.zeros((len(time), 3)), rates, name="turning")

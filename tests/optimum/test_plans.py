@@ -15,6 +15,7 @@ from motion_cueing.baselines import ClassicalWashout, make_policy
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
 from motion_cueing.baselines.optimum.problem import Problem
 from motion_cueing.baselines.optimum.windows import Planner, windows
+from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.perception import get_vestibular_model
@@ -22,7 +23,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.simulator import Simulator
 from motion_cueing.evaluation import measure, rollout
 
-from .drives import DT, gentle, hard_braking, surge, weaving
+from .drives import DT, gentle, hard_braking, surge, turning, weaving
 
 COARSE = OptimumOptions(steps=5, effort=1e-3)
 """One set of options for most tests: the program of a machine is made once for them all."""
@@ -51,6 +52,22 @@ def test_the_plan_gives_what_it_claims_and_meets_no_limit(braking):
 
 def test_the_limits_are_used(braking):
     assert 0.6 < np.abs(braking[2].legs).max() < 0.67
+
+
+def test_a_plan_that_comes_near_a_singular_pose_is_made_anew_clear_of_it():
+    """Without a turntable the hexapod yaws for as long as its legs, longer here, let it."""
+    drive, machine = turning(6.0, 0.3), get_platform("paper-no-turntable")
+    machine = replace(machine, hexapod=replace(machine.hexapod, extension=(-0.67, 1.2)))
+    record = rollout(
+        Optimum(machine, options=replace(COARSE, steps=20), cached=False), drive, platform=machine
+    )
+    account = {key: int(record.metadata[f"optimum_{key}"]) for key in ("widened", "unconverged", "braked")}
+    assert account == {"widened": 1, "unconverged": 0, "braked": 0}
+    assert not record.limits_active.any()
+    assert measure(record).cue_error == pytest.approx(float(record.metadata["optimum_claimed"]), rel=1e-6)
+    poses = np.hstack([np.zeros((len(record.time), 2)), record.hexapod, np.zeros((len(record.time), 1))])
+    clearance = np.array(SymbolicMachine(machine).clearance(poses.T))
+    assert 0.15 < clearance.min() < 0.3
 
 
 def costs_with(drive: CueTrace, accelerations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
