@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import hashlib
 import io
 import zlib
 from collections.abc import Mapping
@@ -96,6 +97,20 @@ class CueTrace:
     def duration(self) -> float:
         """From the first sample to the last, s."""
         return float(self.time[-1] - self.time[0])
+
+    def digest(self) -> str:
+        """SHA-256 of the motion, in hexadecimal: what is felt alike has the same, whatever it is called.
+
+        It covers the time step, specific force, angular velocity and angular acceleration, to the bit; not
+        the name, the source or the channels.
+        """
+        found = hashlib.sha256()
+        motion = (self.specific_force, self.angular_velocity, self.angular_acceleration)
+        for values in (np.float64(self.dt), *motion):
+            found.update(f"{values.shape}".encode())
+            # One byte order, so that the same drive has the same digest on every machine.
+            found.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+        return found.hexdigest()
 
     def at_point(self, offset: ArrayLike) -> Floats:
         """Specific force (n, 3) at a point fixed to the car, ``offset`` (3,) in metres from F_A's origin.

@@ -16,6 +16,8 @@ from motion_cueing.envs import CueTrace
 from motion_cueing.envs.cues import CSV_COLUMNS, read_table
 from motion_cueing.envs.errors import DataError, MotionCueingError
 
+MOTION = ("specific_force", "angular_velocity", "angular_acceleration")
+
 
 def fields(n: int = 5, **changes: Any) -> dict[str, Any]:
     """Arguments of a good trace, some of them changed."""
@@ -44,6 +46,30 @@ def test_fields_are_copied_and_read_only() -> None:
         with pytest.raises(ValueError, match="read-only"):
             values[0] = 1.0
     assert (len(trace), trace.dt, trace.duration) == (5, pytest.approx(0.1), pytest.approx(0.4))
+
+
+def test_the_digest_is_of_the_motion_alone() -> None:
+    trace = CueTrace(**fields())
+    wanted = trace.digest()
+    assert len(bytes.fromhex(wanted)) == 32
+    named = CueTrace(**fields(name="other", source="elsewhere", channels={}, time=7.0 + 0.5 * np.arange(5)))
+    assert CueTrace(**fields(name="other", source="elsewhere", channels={})).digest() == wanted
+    assert CueTrace(**fields(angular_acceleration=trace.angular_acceleration)).digest() == wanted
+    moved = {name: np.array(getattr(trace, name)) for name in MOTION}
+    changed = [named.digest(), CueTrace(**fields(4)).digest()]
+    for name in MOTION:
+        other = {key: value.copy() for key, value in moved.items()}
+        other[name].flat[-1] = np.nextafter(other[name].flat[-1], np.inf)
+        changed.append(CueTrace(**fields(**other)).digest())
+    assert len({wanted, *changed}) == 1 + len(changed)
+
+
+def test_the_digest_tells_which_signal_is_which() -> None:
+    """The same numbers in another signal are another drive."""
+    one, two = np.arange(15.0).reshape(5, 3), np.ones((5, 3))
+    a = CueTrace(**fields(specific_force=one, angular_velocity=two, angular_acceleration=two))
+    b = CueTrace(**fields(specific_force=two, angular_velocity=one, angular_acceleration=two))
+    assert a.digest() != b.digest()
 
 
 def test_lists_will_do() -> None:
