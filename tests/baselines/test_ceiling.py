@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import pickle
+import shutil
 from dataclasses import replace
 
 import pytest
 
-from motion_cueing.baselines import ForeknowingPolicy, make_policy
-from motion_cueing.baselines.ceiling import ceiling_maneuvers, load_ceiling
+from motion_cueing.baselines import ForeknowingPolicy, ceiling, make_policy
+from motion_cueing.baselines.ceiling import CeilingWashout, ceiling_maneuvers, load_ceiling
 from motion_cueing.baselines.washout import load_washout
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.envs.car import get_maneuver, maneuver_names
 from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import to_dict
 from motion_cueing.evaluation import measure, rollout
 
 from .drives import trace
 
 PAPER = get_platform("paper")
+LOCKED = get_platform("paper-no-turntable")
 
 
 def test_there_is_a_set_for_every_standard_maneuver_and_it_is_better_than_the_others():
@@ -41,3 +45,33 @@ def test_it_is_told_the_maneuver_by_its_name():
         policy.for_drive(replace(cues, name="lane-chang"))
     with pytest.raises(UnknownNameError, match="maneuver of classical-ceiling 'test'"):
         rollout(policy, trace(0.2), PAPER)
+
+
+def test_without_a_turntable_it_yaws_with_the_hexapod():
+    """Where the share of the turntable were lost, most of the lane change's yaw would be: J 0.18."""
+    cues = get_maneuver("lane-change").drive()
+    found = measure(rollout(CeilingWashout(LOCKED), cues, LOCKED)).cue_error
+    assert found < 0.01
+    hexapod = replace(load_ceiling("lane-change"), turntable_share=0.0)
+    expected = WashoutBatch([hexapod], [cues], LOCKED).scores().cue_error[0, 0]
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_its_name_and_its_sets_survive_a_copy():
+    policy = pickle.loads(pickle.dumps(CeilingWashout(LOCKED)))
+    assert policy.parameters == CeilingWashout(LOCKED).parameters
+    washout = policy.for_drive(get_maneuver("lane-change").drive())
+    assert pickle.loads(pickle.dumps(washout)).name == washout.name == "classical-ceiling"
+
+
+def test_a_set_that_is_edited_shows_in_its_parameters(tmp_path, monkeypatch):
+    before = CeilingWashout(PAPER).parameters
+    assert list(before.sets) == ceiling_maneuvers()
+    shutil.copytree(ceiling._SETS, tmp_path / "sets")
+    monkeypatch.setattr(ceiling, "_SETS", tmp_path / "sets")
+    assert to_dict(CeilingWashout(PAPER).parameters) == to_dict(before)
+    file = tmp_path / "sets" / "lane-change.yaml"
+    share = f"turntable_share: {before.sets['lane-change'].turntable_share}"
+    file.write_text(file.read_text().replace(share, "turntable_share: 0.5"))
+    assert CeilingWashout(PAPER).parameters.sets["lane-change"].turntable_share == 0.5
+    assert to_dict(CeilingWashout(PAPER).parameters) != to_dict(before)
