@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from tyro.conf import arg
 
@@ -24,12 +24,10 @@ from ..train.demonstrations import (
 from ..train.provenance import command_line, commit, hardware, now, versions
 from .demonstration import Demonstrator, demonstrate
 from .metrics import measure
+from .recording import notes_of
 from .selection import find_car, find_maneuvers, find_platform
 from .suite import CueSource
 from .suite_progress import suite_progress
-
-if TYPE_CHECKING:
-    pass
 
 _SUCCESS: Final = 0
 
@@ -73,15 +71,29 @@ def run(command: DemonstrateCommand) -> int:
     sources = _sources(command)
     index = _index(command, _setting(command, demonstrator))
     index.save(command.out)
-    kept = {entry.name for entry in index.drives if is_kept(command.out, entry)}
-    missing = {name: source for name, source in sources.items() if name not in kept}
-    with suite_progress(len(missing)) as advance:
-        for name, source in missing.items():
+    recorded = 0
+    with suite_progress(len(sources)) as advance:
+        for name, source in sources.items():
             advance(name, demonstrator.name)
-            index = index.with_drive(_record(command.out, name, _cues(name, source), demonstrator))
+            cues = _cues(name, source).resampled(demonstrator.time_step)
+            if _is_done(command.out, index, name, cues):
+                continue
+            index = index.with_drive(_record(command.out, name, cues, demonstrator))
             index.save(command.out)
-    print(_summary(command.out, index, len(missing)))
+            recorded += 1
+    print(_summary(command.out, index, recorded))
     return _SUCCESS
+
+
+def _is_done(folder: Path, index: Index, name: str, cues: CueTrace) -> bool:
+    """Whether the drive of a name is there, and is of these cues; says so if it is of others."""
+    kept = next((entry for entry in index.drives if entry.name == name), None)
+    if kept is None or not is_kept(folder, kept):
+        return False
+    if kept.cues != cues.digest():
+        print(f"{name}: its cues are not those that were recorded; recorded anew")
+        return False
+    return True
 
 
 def _policy_name(command: DemonstrateCommand) -> str:
@@ -127,7 +139,7 @@ def _setting(command: DemonstrateCommand, demonstrator: Demonstrator) -> dict[st
     return {
         "policy": demonstrator.name,
         "parameters": demonstrator.parameters,
-        "car": command.car,
+        "car": to_dict(find_car(command.car)),
         "platform": to_dict(demonstrator.platform),
         "vestibular": demonstrator.vestibular.name,
         "time_step": demonstrator.time_step,
@@ -157,17 +169,17 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
     record, drive = demonstrate(demonstrator, name, cues)
     found = measure(record)
     file = f"{name}.npz"
-    common = ("parameters", "vestibular", "source")
     return DriveEntry(
         name=name,
         file=file,
         sha256=save_drive(folder, file, drive),
         source=cues.source,
+        cues=cues.digest(),
         steps=len(drive),
         cue_error=found.cue_error,
         perceived_cue_error=found.perceived_cue_error,
         at_limit=found.at_limit,
-        notes={key: value for key, value in record.metadata.items() if key not in common},
+        notes=notes_of(record.metadata),
     )
 
 

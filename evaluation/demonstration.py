@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +19,7 @@ from ..train.demonstrations import Demonstration
 from .drivers import TaskPolicy
 from .rollout import rollout
 from .trajectory import Trajectory
+from .wrapped import Wrapped
 
 
 @dataclass(frozen=True)
@@ -64,19 +64,13 @@ class Demonstrator:
         return {} if found is None else to_dict(found)
 
 
-class _Watched:
+class _Watched(Wrapped):
     """A policy that remembers what it saw."""
 
     def __init__(self, policy: Policy) -> None:
+        super().__init__(policy)
         self._policy = policy
-        self.name, self.parameters = getattr(policy, "name", ""), getattr(policy, "parameters", None)
-        self.start = getattr(policy, "start", np.zeros(9))
         self.seen: list[NDArray[np.float64]] = []
-
-    @property
-    def notes(self) -> Mapping[str, str]:
-        """Of the policy."""
-        return getattr(self._policy, "notes", {})
 
     def predict(
         self,
@@ -100,7 +94,13 @@ def demonstrate(demonstrator: Demonstrator, name: str, cues: CueTrace) -> tuple[
     """
     cues, policy = cues.resampled(demonstrator.time_step), demonstrator.policy
     watched = _Watched(policy.for_drive(cues) if isinstance(policy, ForeknowingPolicy) else policy)
-    record = rollout(watched, cues, demonstrator.platform, vestibular=demonstrator.vestibular)
+    record = rollout(
+        watched,
+        cues,
+        demonstrator.platform,
+        vestibular=demonstrator.vestibular,
+        dt=demonstrator.time_step,
+    )
     before = slice(0, len(record) - 1)
     axes = (record.carriage, record.hexapod, record.turntable)
     rates = (record.carriage_rate, record.hexapod_rate, record.turntable_rate)

@@ -19,7 +19,7 @@ from ..envs.platform import ActuatorDynamics, Platform
 from ..envs.settings import Positive, configuration, to_dict
 from .fitting import moved_to, policy_on
 from .rollout import AnyPolicy
-from .sensor_noise import SensorNoise, with_noise
+from .sensor_noise import NOISE_VERSION, SensorNoise, with_noise
 from .study import Condition
 from .suite import CueSource
 
@@ -154,7 +154,7 @@ class Study:
             return with_noise(self._made(policy), noise)
 
         sizes = f"{noise.force:g} m/s² and {math.degrees(noise.rate):.2g} deg/s"
-        about = {"noise": to_dict(noise)}
+        about = {"noise": {"version": NOISE_VERSION, **to_dict(noise)}}
         description = f"white noise of {sizes} on the cues seen"
         return replace(self._nominal, name="noise", description=description, make=make, about=about)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,9 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..envs.errors import DataError
-from ..envs.settings import from_dict, to_dict
-from ..envs.storage import write_text
+from ..envs.settings import configuration
+from . import saved
 from .frequency_response import FrequencyResponse
 from .provenance import versions
 from .spreadsheet import save_rows
@@ -77,15 +75,26 @@ def save_csv(responses: Sequence[FrequencyResponse], path: Path) -> None:
     save_rows([row for response in responses for row in _flat(response)], path)
 
 
+@configuration
+class SavedResponses:
+    """What ``frequency-response.json`` holds.
+
+    Args:
+        schema: :data:`SCHEMA`.
+        command: The command line.
+        versions: Of this package, Python and the libraries that matter.
+        responses: One a policy.
+    """
+
+    schema: int
+    command: str
+    versions: dict[str, str]
+    responses: tuple[FrequencyResponse, ...]
+
+
 def save_json(responses: Sequence[FrequencyResponse], arguments: Sequence[str], path: Path) -> None:
     """Write everything, with the command line and the versions that made it."""
-    content = {
-        "schema": SCHEMA,
-        "command": shlex.join(arguments),
-        "versions": versions(),
-        "responses": [to_dict(response) for response in responses],
-    }
-    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    saved.save_json(SavedResponses(SCHEMA, shlex.join(arguments), versions(), tuple(responses)), path)
 
 
 def load_json(path: str | Path) -> list[FrequencyResponse]:
@@ -93,12 +102,6 @@ def load_json(path: str | Path) -> list[FrequencyResponse]:
 
     Raises:
         DataError: the file is missing, broken, or of another version.
+        ConfigurationError: a field is missing, unknown or wrong.
     """
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as frequency responses ({error})") from None
-    found = content.get("schema") if isinstance(content, dict) else None
-    if found != SCHEMA:
-        raise DataError(f"{path}: frequency responses of version {found}, this package reads {SCHEMA}")
-    return [from_dict(FrequencyResponse, values, str(path)) for values in content["responses"]]
+    return list(saved.load_json(SavedResponses, path, "frequency responses", SCHEMA).responses)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
@@ -10,11 +9,10 @@ from typing import Any, Final
 
 from pydantic import JsonValue
 
-from ..envs.errors import DataError
-from ..envs.settings import configuration, from_dict, to_dict
-from ..envs.storage import write_text
+from ..envs.settings import configuration, to_dict
 from .criteria import Criteria
 from .metrics import Metrics
+from .saved import load_json, save_json
 from .share import Share, shares
 from .spreadsheet import save_rows
 from .verdict import Standing, Verdict, judge, judge_suite
@@ -131,7 +129,7 @@ class Results:
 
     def save_json(self, path: str | Path) -> None:
         """Write ``results.json``, whole or not at all."""
-        write_text(path, json.dumps(to_dict(self), indent=1, allow_nan=False) + "\n")
+        save_json(self, path)
 
     @classmethod
     def load_json(cls, path: str | Path) -> Results:
@@ -139,15 +137,9 @@ class Results:
 
         Raises:
             DataError: the file is missing, broken, or of another version.
+            ConfigurationError: a field is missing, unknown or wrong.
         """
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-            raise DataError(f"{path}: cannot be read as results ({error})") from None
-        found = values.get("schema") if isinstance(values, dict) else None
-        if found != SCHEMA:
-            raise DataError(f"{path}: results of version {found}, this package reads {SCHEMA}")
-        return from_dict(cls, values, str(path))
+        return load_json(cls, path, "results", SCHEMA)
 
     def save_csv(self, path: str | Path) -> None:
         """Write ``results.csv``: one row a drive, one column a metric, nothing where undefined."""

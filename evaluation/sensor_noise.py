@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,12 @@ from ..envs.settings import NonNegative, configuration
 from ..envs.task.layout import DIFFERENCE
 from .drivers import TaskPolicy
 from .rollout import AnyPolicy
+from .wrapped import Wrapped
 
 Array = NDArray[Any]
+
+NOISE_VERSION: Final = 2
+"""Of what noise is: drives of another one are driven again. 1 was a constant for policies without memory."""
 
 _KINDS = (("wanted_force", "felt_force", "force_error"), ("wanted_rate", "felt_rate", "rate_error"))
 _ERRORS = {row.name: row.scale for row in DIFFERENCE}
@@ -46,8 +50,11 @@ def with_noise(policy: AnyPolicy, noise: SensorNoise) -> AnyPolicy:
     return _TaskBehind(policy, noise) if isinstance(policy, TaskPolicy) else _Behind(policy, noise)
 
 
-class _Behind:
+class _Behind(Wrapped):
     """A policy that sees noisy observations.
+
+    Its state is the policy's own in a tuple, so that it is never None but at the beginning, not even where
+    the policy has none.
 
     Args:
         policy: What is behind the sensors.
@@ -58,25 +65,27 @@ class _Behind:
     """Where the observation has the difference of cues wanted and felt, by name."""
 
     def __init__(self, policy: Policy | TaskPolicy, noise: SensorNoise) -> None:
+        super().__init__(policy)
         self._policy, self._noise = policy, noise
         self._draw = np.random.default_rng(noise.seed)
-        self.name = getattr(policy, "name", type(policy).__name__)
-        self.parameters = getattr(policy, "parameters", None)
-        self.notes = getattr(policy, "notes", {})
-        if hasattr(policy, "start"):
-            self.start = policy.start
 
     def predict(
         self,
         observation: Array,
-        state: Any = None,
+        state: tuple[Any] | None = None,
         episode_start: Array | None = None,
         deterministic: bool = True,
-    ) -> tuple[Array, Any]:
-        """The answer to the observation with noise on it; the noise begins anew with a drive."""
-        if state is None:
+    ) -> tuple[Array, tuple[Any]]:
+        """The answer to the observation with noise on it.
+
+        The noise begins anew, for all rows, where ``episode_start`` says of any that a drive begins; where it
+        is None, where ``state`` is.
+        """
+        if state is None if episode_start is None else np.any(episode_start):
             self._draw = np.random.default_rng(self._noise.seed)
-        return self._policy.predict(self._noisy(observation), state, episode_start, deterministic)
+        inner = None if state is None else state[0]
+        action, memory = self._policy.predict(self._noisy(observation), inner, episode_start, deterministic)
+        return action, (memory,)
 
     def _noisy(self, observation: Array) -> Array:
         seen = np.array(observation)
@@ -101,14 +110,13 @@ class _TaskBehind(_Behind):
         self.errors = {} if layout is None else {name: layout.slices[name] for name in _ERRORS}
 
 
-class _ForeknowingBehind:
+class _ForeknowingBehind(Wrapped):
     """The same for a policy that is told the drive."""
 
     def __init__(self, policy: ForeknowingPolicy, noise: SensorNoise) -> None:
+        super().__init__(policy)
         self._told: Callable[[CueTrace], Policy] = policy.for_drive
         self._noise = noise
-        self.name = getattr(policy, "name", type(policy).__name__)
-        self.parameters = getattr(policy, "parameters", None)
 
     def for_drive(self, cues: CueTrace) -> Policy:
         """The policy for one drive."""

@@ -78,63 +78,93 @@ def run_study(
         folder: Where drives are kept, one file a condition and policy.
         progress: Told before each drive.
     """
-    outcome = StudyOutcome()
+    study = _Running(folder, progress)
     for condition in conditions:
-        cues = _cues(condition, outcome)
-        outcome.metrics[condition.name] = {}
-        outcome.left_out[condition.name] = {}
+        study.drive(condition, policies)
+    return study.outcome
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """One policy under one condition, and where its drives are kept."""
+
+    condition: Condition
+    label: str
+    policy: AnyPolicy
+    who: Mapping[str, Any]
+    store: PairStore
+
+    def key(self, cues: CueTrace) -> str:
+        condition = self.condition
+        return drive_key(condition.platform, condition.car, condition.about, self.who, cues)
+
+    def driven(self, key: str, cues: CueTrace) -> KeptDrive:
+        drive = rollout(self.policy, cues, self.condition.platform, self.condition.car)
+        return KeptDrive(key, measure(drive), notes_of(drive.metadata))
+
+
+class _Running:
+    """A study under way: what it found so far."""
+
+    def __init__(self, folder: Path, progress: Callable[[str, str], None]) -> None:
+        self.outcome = StudyOutcome()
+        self._folder, self._progress = folder, progress
+
+    def drive(self, condition: Condition, policies: Mapping[str, str]) -> None:
+        """Every policy under a condition."""
+        cues = self._cues(condition)
+        metrics = self.outcome.metrics[condition.name] = {}
+        left_out = self.outcome.left_out[condition.name] = {}
         for label, name in policies.items():
             try:
                 policy = condition.make(name)
             except MotionCueingError as error:
-                outcome.left_out[condition.name][label] = str(error)
+                left_out[label] = str(error)
                 for _ in condition.maneuvers:
-                    progress(condition.name, label)
+                    self._progress(condition.name, label)
                 continue
-            store = PairStore(folder, condition.name, label)
-            found = _drive_all(condition, label, name, policy, cues, store, outcome, progress)
-            outcome.metrics[condition.name][label] = found
-    return outcome
+            store = PairStore(self._folder, condition.name, label)
+            metrics[label] = self._drives(
+                _Pair(condition, label, policy, identity(name, policy), store), cues
+            )
 
-
-def _cues(condition: Condition, outcome: StudyOutcome) -> dict[str, CueTrace]:
-    found: dict[str, CueTrace] = {}
-    for maneuver, source in condition.maneuvers.items():
-        try:
-            found[maneuver] = source()
-        except Exception as error:
-            outcome.failures.append(StudyFailure(condition.name, None, maneuver, explain(error)))
-    return found
-
-
-def _drive_all(
-    condition: Condition,
-    label: str,
-    name: str,
-    policy: AnyPolicy,
-    cues: Mapping[str, CueTrace],
-    store: PairStore,
-    outcome: StudyOutcome,
-    progress: Callable[[str, str], None],
-) -> dict[str, Metrics]:
-    """One policy under one condition: metrics by maneuver."""
-    who = identity(name, policy)
-    found: dict[str, Metrics] = {}
-    for maneuver, trace in cues.items():
-        progress(f"{condition.name}, {maneuver}", label)
-        key = drive_key(condition.platform, condition.car, condition.about, who, trace)
-        kept = store.find(maneuver, key)
-        if kept is None:
-            # A policy is a user's code: whatever it raises must not cost the other drives.
+    def _cues(self, condition: Condition) -> dict[str, CueTrace]:
+        found: dict[str, CueTrace] = {}
+        for maneuver, source in condition.maneuvers.items():
             try:
-                drive = rollout(policy, trace, condition.platform, condition.car)
-                kept = KeptDrive(key, measure(drive), notes_of(drive.metadata))
+                found[maneuver] = source()
             except Exception as error:
-                outcome.failures.append(StudyFailure(condition.name, label, maneuver, explain(error)))
+                self.outcome.failures.append(StudyFailure(condition.name, None, maneuver, explain(error)))
+        return found
+
+    def _drives(self, pair: _Pair, cues: Mapping[str, CueTrace]) -> dict[str, Metrics]:
+        """Metrics by maneuver."""
+        name, label = pair.condition.name, pair.label
+        found: dict[str, Metrics] = {}
+        for maneuver in pair.condition.maneuvers:
+            self._progress(f"{name}, {maneuver}", label)
+            kept = self._kept(pair, maneuver, cues[maneuver]) if maneuver in cues else None
+            if kept is None:
                 continue
-            store.keep(maneuver, kept)
-            outcome.driven += 1
-        found[maneuver] = kept.metrics
-        if kept.notes:
-            outcome.notes.setdefault(condition.name, {}).setdefault(label, {})[maneuver] = kept.notes
-    return found
+            found[maneuver] = kept.metrics
+            if kept.notes:
+                self.outcome.notes.setdefault(name, {}).setdefault(label, {})[maneuver] = kept.notes
+        return found
+
+    def _kept(self, pair: _Pair, maneuver: str, cues: CueTrace) -> KeptDrive | None:
+        """A drive that is kept, or is now; None where it fails."""
+        key = pair.key(cues)
+        kept = pair.store.find(maneuver, key)
+        if kept is not None:
+            return kept
+        # A policy is a user's code: whatever it raises must not cost the other drives.
+        try:
+            kept = pair.driven(key, cues)
+        except Exception as error:
+            self.outcome.failures.append(
+                StudyFailure(pair.condition.name, pair.label, maneuver, explain(error))
+            )
+            return None
+        pair.store.keep(maneuver, kept)
+        self.outcome.driven += 1
+        return kept

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from ..envs.errors import DataError
-from ..envs.settings import configuration, from_dict, to_dict
-from ..envs.storage import write_text
+from ..envs.settings import configuration, to_dict
 from .criteria import Criteria
 from .metrics import Metrics
+from .saved import load_json, save_json
 from .share import shares
 from .spreadsheet import save_rows
 
@@ -99,7 +97,7 @@ class StudyResults:
 
     def save_json(self, path: str | Path) -> None:
         """Write ``study.json``, whole or not at all."""
-        write_text(path, json.dumps(to_dict(self), indent=1, allow_nan=False) + "\n")
+        save_json(self, path)
 
     @classmethod
     def load_json(cls, path: str | Path) -> StudyResults:
@@ -107,15 +105,9 @@ class StudyResults:
 
         Raises:
             DataError: the file is missing, broken, or of another version.
+            ConfigurationError: a field is missing, unknown or wrong.
         """
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-            raise DataError(f"{path}: cannot be read as a study ({error})") from None
-        found = values.get("schema") if isinstance(values, dict) else None
-        if found != SCHEMA:
-            raise DataError(f"{path}: a study of version {found}, this package reads {SCHEMA}")
-        return from_dict(cls, values, str(path))
+        return load_json(cls, path, "a study", SCHEMA)
 
     def save_csv(self, path: Path) -> None:
         """Write ``study.csv``: a row a condition and policy, with the reason where it was left out."""

@@ -115,8 +115,6 @@ def drive_key(
         "car": to_dict(car),
         "about": dict(about),
         "policy": dict(policy),
+        "cues": cues.digest(),
     }
-    digest = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
-    for array in (cues.time, cues.specific_force, cues.angular_velocity, cues.angular_acceleration):
-        digest.update(array.tobytes())
-    return digest.hexdigest()
+    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import yaml
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
+from ..baselines.families import ALGORITHMS, AnyWashout, algorithm_of, load_of
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.settings import to_dict
@@ -20,7 +21,6 @@ from .selection import find_car, find_maneuvers, find_platform
 from .tune_progress import TuningProgress
 
 if TYPE_CHECKING:
-    from ..baselines.families import AnyWashout
     from ..baselines.tuning.objective import Objective
     from ..baselines.tuning.options import TuningOptions
     from ..baselines.tuning.search import Record, Search
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
 _SUCCESS: Final = 0
 _INTERRUPTED: Final = 130
-_ALGORITHMS: Final = {"classical": "classical", "adaptive": "adaptive", "optimal": "optimal-washout"}
-"""What can be tuned, and the preset a search begins with."""
-
 _TRACK: Final = "random track drive"
 """Source of a random drive on a handling track."""
 
@@ -43,7 +40,7 @@ class TuneCommand:
     --policy FILE`. Ctrl-C stops after the generation at hand; --resume goes on.
     """
 
-    algorithm: Positional[Annotated[str, arg(metavar="|".join(_ALGORITHMS))]]
+    algorithm: Positional[Annotated[str, arg(metavar="|".join(ALGORITHMS))]]
     """What to tune."""
     objective: Literal["J", "perceived"] = "J"
     """What to minimise: J, or J of what the driver senses."""
@@ -81,7 +78,7 @@ def run(command: TuneCommand) -> int:
     Raises:
         MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
     """
-    look_up("algorithm", command.algorithm, _ALGORITHMS)
+    look_up("algorithm", command.algorithm, ALGORITHMS)
     command = replace(command, out=_out(command))
     _check(command)
     record = _record(command)
@@ -101,7 +98,7 @@ def run(command: TuneCommand) -> int:
 
 
 def _out(command: TuneCommand) -> Path:
-    return command.out or Path(f"{_ALGORITHMS[command.algorithm]}-tuned.yaml")
+    return command.out or Path(f"{ALGORITHMS[command.algorithm].start}-tuned.yaml")
 
 
 def _check(command: TuneCommand) -> None:
@@ -125,8 +122,6 @@ def _check_resumed(command: TuneCommand) -> None:
 
 
 def _check_algorithm(command: TuneCommand, record: Record) -> None:
-    from ..baselines.families import algorithm_of
-
     begun = algorithm_of(record.options.start)
     if begun != command.algorithm:
         raise ConfigurationError(
@@ -151,12 +146,11 @@ def _record(command: TuneCommand) -> Record:
 
 
 def _options(command: TuneCommand) -> TuningOptions:
-    from ..baselines.families import load_of
     from ..baselines.tuning.options import TuningOptions
 
     given = {name: getattr(command, name) for name in ("drives", "budget", "seed")}
     return TuningOptions(
-        start=load_of(command.algorithm, command.start or _ALGORITHMS[command.algorithm]),
+        start=load_of(command.algorithm, command.start or ALGORITHMS[command.algorithm].start),
         objective=command.objective,
         method=command.method,
         limits=command.limits,

@@ -26,8 +26,8 @@ from ..envs.storage import write_bytes, write_text
 
 Floats = NDArray[np.float64]
 
-FORMAT: Final = 1
-"""Version of the format; a reader refuses others."""
+FORMAT: Final = 2
+"""Version of the format; a reader refuses others. 1 did not say what was driven."""
 
 INDEX: Final = "index.json"
 
@@ -91,6 +91,7 @@ class DriveEntry:
         file: In the folder.
         sha256: Of the file.
         source: Where the cues come from.
+        cues: ``CueTrace.digest`` of what was driven, at the time step of the drive.
         steps: Time steps.
         cue_error: J of the drive.
         perceived_cue_error: Its perceived twin.
@@ -102,6 +103,7 @@ class DriveEntry:
     file: str
     sha256: str
     source: str
+    cues: str
     steps: int
     cue_error: float
     perceived_cue_error: float
@@ -114,7 +116,7 @@ class Index:
     """A folder's table of contents.
 
     Args:
-        setting: What all drives have in common: policy, its parameters, machine, perception, time step.
+        setting: What all drives have in common: policy, its parameters, car, machine, perception, time step.
         provenance: Command, commit, versions and time of the recording's beginning.
         drives: Those recorded, in order.
     """
@@ -147,7 +149,9 @@ def load_index(folder: str | Path) -> Index:
     except json.JSONDecodeError as error:
         raise DataError(f"{path}: not JSON ({error})") from None
     if not isinstance(values, dict) or values.get("format") != FORMAT:
-        raise DataError(f"{path}: not an index of demonstrations of format {FORMAT}")
+        raise DataError(
+            f"{path}: not an index of demonstrations of format {FORMAT}; record them into another folder"
+        )
     try:
         drives = tuple(DriveEntry(**drive) for drive in values["drives"])
         return Index(dict(values["setting"]), dict(values["provenance"]), drives)

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.car import get_maneuver
-from motion_cueing.envs.errors import DataError
+from motion_cueing.baselines import ClassicalWashout, NoMotion, ceiling
+from motion_cueing.baselines.ceiling import load_ceiling
+from motion_cueing.envs.car import get_car, get_maneuver
+from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.observation import read
+from motion_cueing.envs.perception import get_vestibular_model
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import save
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.demonstration import Demonstrator, demonstrate
 from motion_cueing.train.demonstrations import Demonstration, load_demonstrations, load_index
 
 from ..optimum.drives import surge
@@ -74,6 +81,76 @@ def test_a_recording_goes_on_where_it_was_stopped(folder, capsys):
     assert again.provenance == first.provenance
 
 
+def test_a_drive_whose_cues_have_changed_is_recorded_anew(folder, tmp_path, capsys):
+    for name in ("first", "second"):
+        surge(1.0, 1.0).to_csv(tmp_path / f"{name}.csv")
+    words = (*WASHOUT, "--maneuver", "first.csv", "second.csv")
+    assert record(*words) == 0
+    before = {drive.name: drive for drive in load_index(folder).drives}
+    assert before["first"].cues == CueTrace.from_csv("first.csv").digest()
+    capsys.readouterr()
+    changed = surge(1.0, 1.5)
+    changed.to_csv(tmp_path / "second.csv")
+    assert record(*words) == 0
+    shown = capsys.readouterr().out
+    assert "second: its cues are not those that were recorded; recorded anew" in shown
+    assert "2 drives (1 new)" in shown
+    after = {drive.name: drive for drive in load_index(folder).drives}
+    assert after["first"] == before["first"]
+    assert after["second"].cues != before["second"].cues
+    force = {drive.name: drive.force for drive in load_demonstrations(folder)}
+    np.testing.assert_allclose(force["second"], changed.specific_force[:-1], atol=1e-7)
+    assert record(*words) == 0
+    assert "2 drives (0 new)" in capsys.readouterr().out
+
+
+def test_a_car_whose_file_has_changed_is_refused(folder, tmp_path, capsys):
+    car = get_car("sedan")
+    words = (*WASHOUT, "--maneuver", "sine-with-dwell", "--car", "mine.yaml")
+    save(replace(car, name="mine"), tmp_path / "mine.yaml")
+    assert record(*words) == 0
+    assert load_index(folder).setting["car"]["mass"] == car.mass
+    assert record(*words) == 0
+    save(replace(car, name="mine", mass=1.1 * car.mass), tmp_path / "mine.yaml")
+    capsys.readouterr()
+    assert record(*words) == 2
+    assert "holds drives of another controller, car" in capsys.readouterr().err
+
+
+def test_a_ceiling_of_other_sets_is_refused(folder, monkeypatch, capsys):
+    words = ("--policy", "classical-ceiling", "--maneuver", "sine-with-dwell")
+    assert record(*words) == 0
+    edited = replace(load_ceiling("sine-with-dwell"), turntable_share=0.25)
+    monkeypatch.setattr(ceiling, "load_ceiling", lambda name: edited)
+    assert record(*words) == 2
+    assert "holds drives of another controller" in capsys.readouterr().err
+
+
+class Counter:
+    """Counts its answers."""
+
+    dt = 0.01
+
+    def __init__(self):
+        self.notes = {"solves": "0"}
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        self.notes = {"solves": str(int(self.notes["solves"]) + 1)}
+        return np.zeros(9), None
+
+
+def test_a_demonstrator_is_watched_as_it_is():
+    cues = surge(1.0, 1.0)
+    one = Demonstrator("mine", Counter(), get_platform("paper"), get_vestibular_model("zacharias"))
+    drive, _ = demonstrate(one, "surge", cues)
+    assert (drive.policy, drive.metadata["solves"]) == ("Counter", str(len(cues) - 1))
+    slow, seen = demonstrate(replace(one, policy=NoMotion(), time_step=0.02), "surge", cues)
+    assert slow.dt == pytest.approx(0.02)
+    assert np.allclose(np.diff(seen.time), 0.02)
+    with pytest.raises(ConfigurationError, match=r"time step is 0\.01 s"):
+        demonstrate(replace(one, time_step=0.02), "surge", cues)
+
+
 def test_a_folder_of_another_controller_is_refused(folder, capsys):
     assert record(*WASHOUT, "--random", "1", "--duration", "1") == 0
     assert record("--policy", "no-motion", "--random", "1", "--duration", "1") == 2
@@ -107,8 +184,8 @@ def test_broken_recordings_are_refused(folder):
     index = json.loads((folder / "index.json").read_text())
     for damaged, told in [
         ("{", "not JSON"),
-        (json.dumps(index | {"format": 2}), "format 1"),
-        (json.dumps({"format": 1}), "missing or unknown"),
+        (json.dumps(index | {"format": 1}), "format 2"),
+        (json.dumps({"format": 2}), "missing or unknown"),
         (json.dumps(index | {"drives": [{"name": "x"}]}), "missing or unknown"),
     ]:
         (folder / "index.json").write_text(damaged)

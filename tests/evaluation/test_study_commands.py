@@ -1,0 +1,104 @@
+"""``motion-cueing compare`` and ``robustness``: what they write, and that they go on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from motion_cueing.envs.platform import ablations, get_platform
+from motion_cueing.envs.settings import save
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.study_results import StudyResults
+
+from .studies import PAPER, bend
+
+
+@pytest.fixture
+def cue_file(tmp_path):
+    path = tmp_path / "bend.csv"
+    bend().to_csv(path)
+    return path
+
+
+def test_compare_writes_everything_and_goes_on(cue_file, tmp_path, capsys):
+    out, machine = tmp_path / "out", tmp_path / "mine.yaml"
+    save(replace(get_platform("dim-hexapod"), name="mine"), machine)
+    argv = [
+        "compare",
+        "--platforms",
+        "paper",
+        str(machine),
+        "--ablations",
+        "--policies",
+        "no-motion",
+        "classical",
+    ]
+    argv += ["--maneuvers", str(cue_file), "--out", str(out)]
+    assert main(argv) == 0
+    shown = capsys.readouterr().out
+    assert "10 of 10 drives driven now" in shown
+    assert "paper-hexapod-only" in shown
+    assert {file.name for file in out.iterdir()} == {
+        "pairs",
+        "study.json",
+        "study.csv",
+        "study.md",
+        "study.png",
+    }
+    results = StudyResults.load_json(out / "study.json")
+    assert list(results.conditions) == ["paper", *(one.name for one in ablations(PAPER)), "mine"]
+    assert sorted(results.command.split()) == sorted(["motion-cueing", *argv])
+    assert main(argv) == 0
+    assert "0 of 10 drives driven now" in capsys.readouterr().out
+    assert main([*argv, "--fresh"]) == 0
+    assert "10 of 10 drives driven now" in capsys.readouterr().out
+
+
+def test_robustness_writes_everything(cue_file, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["robustness", "--policies", "no-motion", "classical", "learned-preview"]
+    argv += ["--maneuvers", str(cue_file)]
+    assert main([*argv, "--lag", "15", "--fierceness", "1.5", "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert "18 of 18 drives driven now" in shown
+    values = json.loads((out / "study.json").read_text())
+    assert values["conditions"]["lag"].startswith("actuators with a lag of 15 rad/s")
+    ratio = {
+        who: {name: found[who]["ratio"] for name, found in values["summaries"].items()}
+        for who in values["policies"]
+    }
+    still = ratio["no-motion"]
+    assert {ratio_ for name, ratio_ in still.items() if name != "fierce"} == {1.0}
+    assert still["fierce"] > 1.5
+    for who in ("classical", "learned-preview"):
+        # The file's drive is the same in another car; all else changes what a controller gives.
+        assert ratio[who]["nominal"] == ratio[who]["other car"] == 1.0
+        for name in ("lag", "dead time", "noise", "fierce"):
+            assert ratio[who][name] != 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["compare", "--platforms", "papre"], "paper"),
+        (["compare", "--policies", "classikal"], "classical"),
+        (["compare", "--maneuvers", "none.csv"], "no such file"),
+        (["robustness", "--fierceness", "9"], "fierceness"),
+        (["robustness", "--lag", "0"], "lag"),
+        (["robustness", "--other-car", "tank"], "unknown car"),
+    ],
+)
+def test_wrong_arguments_are_told_in_one_line(words, told, capsys):
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert "Traceback" not in error
+
+
+def test_machines_of_one_name_are_refused(tmp_path, capsys):
+    machine = tmp_path / "mine.yaml"
+    save(replace(PAPER, description="another"), machine)
+    assert main(["compare", "--platforms", "paper", str(machine), "--policies", "no-motion"]) == 2
+    assert "two motion bases" in capsys.readouterr().err
