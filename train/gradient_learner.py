@@ -25,12 +25,7 @@ from .agent import Network
 from .config import TrainingConfig
 from .initial import initial_network
 from .learner import Boundary, State
-
-_WARM_UP: Final = 0.1
-"""Share of the training in which the learning rate rises."""
-
-_LAST_RATE: Final = 0.02
-"""Learning rate at the end, as a share of the largest."""
+from .schedule import warm_cosine
 
 _TINY: Final = 1e-30
 
@@ -120,7 +115,7 @@ class GradientLearner:
         self._lead_back(seen, np.where(np.isfinite(costs), weights, 0.0))
         norm = float(torch.nn.utils.clip_grad_norm_(self.actor.parameters(), self.given.max_grad_norm))
         for group in self._optimizer.param_groups:
-            group["lr"] = self._learning_rate()
+            group["lr"] = self.given.learning_rate * warm_cosine(self.steps / self._total)
         if math.isfinite(norm) and norm > 0.0:
             self._optimizer.step()
         else:
@@ -166,15 +161,6 @@ class GradientLearner:
         largest = self.given.outlier * norms[sound].median()
         factors = torch.where(sound, torch.clamp(largest / norms.clamp_min(_TINY), max=1.0), 0.0)
         return torch.nan_to_num(gradients, 0.0, 0.0, 0.0) * factors[None, :, None]
-
-    def _learning_rate(self) -> float:
-        done = min(self.steps / self._total, 1.0)
-        if done < _WARM_UP:
-            share = max(done / _WARM_UP, _LAST_RATE)
-        else:
-            turn = math.pi * (done - _WARM_UP) / (1.0 - _WARM_UP)
-            share = _LAST_RATE + (1.0 - _LAST_RATE) * 0.5 * (1.0 + math.cos(turn))
-        return self.given.learning_rate * share
 
     def _note(self, costs: Floats, norm: float) -> None:
         terms = self._unroll.terms

@@ -58,6 +58,12 @@ for _algorithm in (
         "analytic policy gradient, through the machine",
         ("torch",),
     ),
+    Algorithm(
+        "dagger",
+        "motion_cueing.train.imitation_learner",
+        "imitation of a controller, with dataset aggregation",
+        ("torch",),
+    ),
 ):
     register(_algorithm)
 
