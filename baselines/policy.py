@@ -15,6 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.cues import CueTrace
+from ..envs.errors import DataError
+from ..envs.observation import OBSERVATION_SIZE
+from ..envs.precision import FLOAT
 from ..envs.simulator import N_AXES
 
 Array = NDArray[Any]
@@ -61,6 +64,56 @@ class ForeknowingPolicy(Protocol):
 def start_of(policy: object) -> Array:
     """(9,) pose a policy likes to begin a drive at: its ``start`` if it has one, else neutral."""
     return np.asarray(getattr(policy, "start", np.zeros(N_AXES)), dtype=np.float64)
+
+
+def checked_observation(observation: Any) -> Array:
+    """Observations as the kernels' numbers.
+
+    Raises:
+        DataError: they are not (n, OBSERVATION_SIZE) or (OBSERVATION_SIZE,) finite numbers.
+    """
+    try:
+        values = np.asarray(observation, dtype=FLOAT)
+    except (TypeError, ValueError):
+        raise DataError(
+            f"observation is not numeric; give an array of (n, {OBSERVATION_SIZE}) numbers"
+        ) from None
+    if values.ndim not in (1, 2) or values.shape[-1] != OBSERVATION_SIZE or not len(values):
+        raise DataError(f"observation has shape {values.shape}, expected (n, {OBSERVATION_SIZE})")
+    if not np.isfinite(values).all():
+        raise DataError("observation is not finite")
+    return values
+
+
+def checked_episode_start(episode_start: Any, n: int) -> NDArray[np.bool_]:
+    """(n,) flags of n environments.
+
+    Raises:
+        DataError: they are something else.
+    """
+    flags = np.asarray(episode_start)
+    if flags.dtype != np.bool_ or flags.shape != (n,):
+        raise DataError(
+            f"episode_start is {kind_of(flags)}; give {n} booleans, one an observation, "
+            "or None in mid-episode"
+        )
+    return flags
+
+
+def wrong_state(state: Any, n: int) -> DataError:
+    """The error for a ``state`` that is not what a policy returned."""
+    return DataError(
+        f"state is {kind_of(state)}; give what the last call for these {n} observations returned, "
+        "or None to begin"
+    )
+
+
+def kind_of(values: Any) -> str:
+    """What something is, for messages."""
+    if not isinstance(values, np.ndarray):
+        return f"of type {type(values).__name__}"
+    held = "washout memory" if values.dtype.names else str(values.dtype)
+    return f"an array of {held} of shape {values.shape}"
 
 
 class NoMotion:

@@ -88,7 +88,9 @@ def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPol
     if str(name) in family_presets():
         return make_washout(load_parameters(str(name)), platform.cab)
     if Path(name).exists():
-        raise DataError(f"{name}: not a policy; expected a washout's .yaml file")
+        raise DataError(
+            f"{name}: not a policy; expected the .yaml file of a washout or a predictive controller"
+        )
     raise UnknownNameError("policy", str(name), policy_names())
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Final
 
 from ...envs.platform.machines import Cab
 from ...envs.precision import vec3
-from ...envs.simulator import TIME_STEP
 from ..washout.classical import kernel_parameters
 from ..washout.family import Family, make_family
 from ..washout.policy import WashoutPolicy
@@ -37,26 +35,10 @@ ADAPTIVE: Final[Family] = make_family(
 """The classical algorithm with adapted gains."""
 
 
-class AdaptiveWashout(WashoutPolicy):
-    """The adaptive washout as a policy; its memory, gains and all, is the policy's state.
+class AdaptiveWashout(WashoutPolicy[AdaptiveParameters]):
+    """The adaptive washout as a policy, gains and all; arguments as of :class:`WashoutPolicy`."""
 
-    Args:
-        parameters: A parameter set, a preset name or a YAML file.
-        cab: Where the driver sits on the machine.
-        dt: Time step, s.
-    """
-
-    def __init__(
-        self,
-        parameters: AdaptiveParameters | str | Path = "adaptive",
-        cab: Cab | None = None,
-        dt: float = TIME_STEP,
-    ) -> None:
-        if not isinstance(parameters, AdaptiveParameters):
-            parameters = load_adaptive(parameters)
-        self.parameters = parameters
-        super().__init__(ADAPTIVE, parameters, cab, dt)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt)
+    family = ADAPTIVE
+    kind = AdaptiveParameters
+    load = staticmethod(load_adaptive)
+    by_hand = "adaptive"

@@ -1,7 +1,15 @@
 """Model predictive control of the nine axes."""
 
-from .named import load_mpc, mpc_presets
-from .parameters import AxisWeights, Forecast, Margins, MpcParameters, TiltRate, Weights
+from .parameters import (
+    AxisWeights,
+    Forecast,
+    Margins,
+    MpcParameters,
+    TiltRate,
+    Weights,
+    load_mpc,
+    mpc_presets,
+)
 from .policy import make_mpc
 
 __all__ = [

@@ -16,6 +16,9 @@ from .problem import moving_axes
 _ROUNDS: Final = 3
 """Newton's steps to the platform's accelerations; each squares the error."""
 
+_LEAST: Final = 1e-3
+"""Of the Jacobian's singular values, relative to the largest: directions in which legs move less are left."""
+
 _SHARE: Final = 1.0 - 1e-6
 """Of the acceleration limits, so that rounding does not exceed them."""
 
@@ -50,5 +53,6 @@ class Brakes:
         action[2:8] = 0.0
         for _ in range(_ROUNDS):
             after, slope = (np.asarray(part) for part in self._after(position, rate, action))
-            action[2:8] += np.linalg.solve(slope, wanted[2:8] - after[:, 0])
+            # Least squares: near a singular pose no accelerations give the legs all of their rates.
+            action[2:8] += np.linalg.lstsq(slope, wanted[2:8] - after[:, 0], rcond=_LEAST)[0]
         return np.asarray(np.where(self._moving, action, 0.0))

@@ -1,6 +1,6 @@
 """CasADi functions as machine code, where a C compiler is at hand; kept for the next time.
 
-A library lies in the user's cache folder under a hash of its C source and of the compiler's command, so
+A library lies in the cache folder under a hash of its C source and of the compiler's command, so
 nothing stale is ever loaded. Without a compiler the function stays what it is: slower, and the same.
 """
 
@@ -16,24 +16,19 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...envs.storage import write_bytes, write_text
+from ..cache import cache_folder
 from ..symbolic.library import cs
 
-_FLAGS: Final = ("-O2", "-fPIC", "-shared")
-"""No flag that would change arithmetic: results are those of the function not compiled, to the bit."""
+_FLAGS: Final = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
+"""No flag that would change arithmetic: results are those of the function not compiled, to the bit.
+
+Compilers contract a * b + c to one rounding where the processor can, unless told not to.
+"""
 
 _COMPILERS: Final = ("cc", "gcc", "clang")
 
 _PATIENCE: Final = 300.0
 """Longest time a compiler may take, s."""
-
-
-def cache_folder() -> Path:
-    """Where libraries are kept: ``MOTION_CUEING_CACHE``, or ``motion-cueing`` in the user's cache folder."""
-    chosen = os.environ.get("MOTION_CUEING_CACHE")
-    if chosen:
-        return Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "motion-cueing"
 
 
 def find_compiler() -> str | None:

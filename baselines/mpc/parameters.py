@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from ...envs.settings import NonNegative, Positive, configuration
 from ...envs.simulator import TIME_STEP
+from ..presets import load_preset, preset_names
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Whole = Annotated[int, Field(ge=1, le=100)]
@@ -113,7 +115,8 @@ class MpcParameters:
         nodes: Times from now at which accelerations are free, s; between them they are straight lines,
             before the first one constant. The last is the horizon.
         every: Time steps from one solution to the next; in between the plan is followed.
-        objective: "cab": the error of the cab's cues, as J; "perceived": of what is sensed of them.
+        objective: "cab": the error of the cab's cues, as J; "perceived": of what is sensed of them, at the
+            cab as well, where perceived J takes the head.
         vestibular: Model of perception for the objective "perceived".
         cab_share: What the cab's error counts beside the perceived one, for the objective "perceived":
             motion too quick to be sensed would cost nothing otherwise.
@@ -121,8 +124,9 @@ class MpcParameters:
         weights: Cost of motion.
         tilt_rate: Soft limit.
         margins: Shares of the machine's limits.
-        penalty: Price of a limit's violation by its whole range, per second; higher than any
-            multiplier, so that limits hold wherever they can.
+        penalty: Price of a limit's violation, its mean over the horizon, in units of the cost: of an
+            actuator's stopping place by half its travel, of its rate by the greatest rate, of its
+            acceleration by the greatest. Higher than any multiplier, so that limits hold wherever they can.
         rounds: Most times that limits are added to a problem until none is violated.
         compile: Whether to compile the machine's derivatives where there is a C compiler: the same
             numbers, sooner.
@@ -158,3 +162,22 @@ class MpcParameters:
     def horizon(self) -> float:
         """The last node, s."""
         return self.nodes[-1]
+
+
+_FOLDER: Final = Path(__file__).parent / "presets"
+
+
+def mpc_presets() -> list[str]:
+    """Names :func:`load_mpc` knows."""
+    return preset_names(_FOLDER)
+
+
+def load_mpc(name: str | Path) -> MpcParameters:
+    """Parameters of a predictive controller, by name or from a YAML file with the fields of MpcParameters.
+
+    Raises:
+        UnknownNameError: no set has this name.
+        DataError: the file cannot be read.
+        ConfigurationError: a field is wrong.
+    """
+    return load_preset(MpcParameters, "predictive controller", name, _FOLDER)

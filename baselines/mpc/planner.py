@@ -24,10 +24,10 @@ class Planned:
         plan: At the nodes.
         active: Limits that hold, to begin the next search with.
         solved: Whether every program was solved.
-        converged: Whether the last program changed next to nothing, or there was to be but one.
+        converged: Whether the last program asked for next to no change, or there was to be but one.
         iterations: Programs solved.
         rounds: Duals solved in all of them.
-        relaxed: Largest violation of a linearised limit in the last one, in shares of its range.
+        relaxed: Largest violation of a linearised limit in the last one, in shares of half its range.
     """
 
     plan: Plan
@@ -49,7 +49,7 @@ class Planner:
         platform: The machine.
         parameters: Of the controller.
         iterations: Most programs a plan; 1 linearises once.
-        tolerance: A program that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
+        tolerance: A step that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
     """
 
     def __init__(
@@ -90,9 +90,10 @@ class Planner:
                 return Planned(plan, active, False, False, count, rounds, 0.0)
             share = 1.0 if self._iterations == 1 else search.share(plan, solution.change)
             plan = after(plan, solution.change, share)
-            largest = share * float(np.max(np.abs(solution.change.acceleration)))
-            if largest <= self._tolerance:
+            largest = float(np.max(np.abs(solution.change.acceleration)))
+            if share * largest <= self._tolerance:
                 break
+        # Of the whole change: a plan from which no share of it is taken is stuck, not at its end.
         converged = self._iterations == 1 or largest <= self._tolerance
         return Planned(plan, active, True, converged, count, rounds, solution.relaxed)
 

@@ -3,95 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...envs.cues import CueTrace
-from ...envs.observation import read
 from ...envs.platform import Platform
 from ...envs.simulator import N_AXES, TIME_STEP
-from ..policy import Array
+from ..policy import Array, checked_episode_start, checked_observation, wrong_state
 from .braking import Brakes
-from .forecast import REST, Forecaster
+from .forecast import Forecaster
 from .linearisation import Floats
+from .memory import Counts, Memory, Moment, moment_of
 from .parameters import MpcParameters
-from .planner import Planned, Planner
-from .solver import Rows
+from .planner import Planner
 from .threads import OneThread
-
-
-@dataclass(frozen=True)
-class Moment:
-    """What a controller sees: positions and rates (9,), the car's cues and the cues' error (6,), SI."""
-
-    position: Floats
-    rate: Floats
-    wanted: Floats
-    error: Floats
-
-
-@dataclass(frozen=True)
-class Memory:
-    """What a controller knows of one machine.
-
-    Args:
-        sample: Of the drive, counted from the start.
-        angle: Turntable angle, unwound, rad.
-        plan: (n, 9) accelerations at the nodes when it was made.
-        age: Time steps since.
-        solved: Whether there is a plan.
-        active: Limits that held in it.
-        error: (6,) of the cues in the last step.
-        lasts: (6,) what of the car's cues lasts; None at the start.
-        sensors: (6, 3) states of the vestibular filters.
-    """
-
-    sample: int
-    angle: float
-    plan: Floats
-    age: int
-    solved: bool
-    active: Rows
-    error: Floats
-    lasts: Floats | None
-    sensors: Floats
-
-
-@dataclass
-class Counts:
-    """What a controller counted.
-
-    Args:
-        solves: Plans made.
-        failures: Plans that were not found; the machine braked.
-        iterations: Programs solved for them.
-        rounds: Duals solved for them.
-        unconverged: Plans still on the move after their last program, where there may be several.
-        relaxed: Plans in which a linearised limit could not be kept.
-    """
-
-    solves: int = 0
-    failures: int = 0
-    iterations: int = 0
-    rounds: int = 0
-    unconverged: int = 0
-    relaxed: int = 0
-
-    def add(self, planned: Planned) -> None:
-        """One more."""
-        self.solves += 1
-        self.failures += not planned.solved
-        self.iterations += planned.iterations
-        self.rounds += planned.rounds
-        self.unconverged += not planned.converged
-        self.relaxed += planned.relaxed > _RELAXED
-
-
-_RELAXED = 1e-3
-"""Violation of a linearised limit from which on a plan counts as relaxed, share of its range."""
 
 
 class PredictiveController:
@@ -115,7 +43,7 @@ class PredictiveController:
         configuration: Any = None,
         cues: CueTrace | None = None,
     ) -> None:
-        self.name = name
+        self.name, self.dt = name, TIME_STEP
         self.parameters = configuration or parameters
         self._mpc, self._planner = parameters, planner
         self._forecast = Forecaster(planner.grid, parameters.forecast, cues)
@@ -135,23 +63,30 @@ class PredictiveController:
         episode_start: Array | None = None,
         deterministic: bool = True,
     ) -> tuple[Array, Any]:
-        """Accelerations; see :meth:`~..policy.Policy.predict`. The state is a memory for each machine."""
+        """Accelerations; see :meth:`~..policy.Policy.predict`. The state is a memory for each machine.
+
+        Raises:
+            DataError: an argument has the wrong type or shape, or the observation is not finite.
+        """
+        observation = np.asarray(checked_observation(observation), dtype=np.float64)
         rows = np.atleast_2d(observation)
-        begins = np.zeros(len(rows), bool) if episode_start is None else np.asarray(episode_start)
+        known = _checked_state(state, len(rows))
+        begins = np.zeros(len(rows), dtype=np.bool_)
+        if episode_start is not None:
+            begins = checked_episode_start(episode_start, len(rows))
         if begins.all():
             self._counts = Counts()
-        known = [None] * len(rows) if state is None else state
         with self._one_thread():
             answers = [
                 self._act(row, None if begin else memory)
                 for row, begin, memory in zip(rows, begins, known, strict=True)
             ]
-        actions = np.array([action for action, _ in answers]).reshape(*np.shape(observation)[:-1], N_AXES)
+        actions = np.array([action for action, _ in answers]).reshape(*observation.shape[:-1], N_AXES)
         return actions, [memory for _, memory in answers]
 
     def _act(self, row: NDArray[Any], memory: Memory | None) -> tuple[Floats, Memory]:
         memory = self._begun() if memory is None else memory
-        moment = _moment(row, memory.angle)
+        moment = moment_of(row, memory.angle)
         sensors = self._planner.perception.advance(memory.sensors, memory.error, moment.error)
         lasts = self._forecast.remember(memory.lasts, moment.wanted)
         memory = replace(memory, angle=moment.position[8], sensors=sensors, error=moment.error, lasts=lasts)
@@ -196,17 +131,13 @@ class PredictiveController:
         return np.asarray(self._planner.grid.at(memory.plan, np.array([middle]))[0])
 
 
-def _moment(row: NDArray[Any], angle: float) -> Moment:
-    """What an observation says, the turntable's angle nearest to ``angle``."""
-    sine, cosine = read(row, "turntable")
-    measured = float(np.arctan2(sine, cosine))
-    turned = measured + 2.0 * np.pi * round((angle - measured) / (2.0 * np.pi))
-    position = [*(read(row, name) for name in ("carriage", "displacement", "beta")), np.array([turned])]
-    rate = [read(row, name) for name in ("carriage_rate", "velocity", "beta_rate", "turntable_rate")]
-    wanted = np.concatenate([read(row, "wanted_force"), read(row, "wanted_rate")])
-    felt = np.concatenate([read(row, "felt_force"), read(row, "felt_rate")])
-    # Observed forces have gravity at rest taken off.
-    return Moment(np.concatenate(position), np.concatenate(rate), wanted + REST, felt - wanted)
+def _checked_state(state: Any, n: int) -> list[Memory] | list[None]:
+    """What is known of n machines."""
+    if state is None:
+        return [None] * n
+    if not isinstance(state, list) or len(state) != n or not all(isinstance(s, Memory) for s in state):
+        raise wrong_state(state, n)
+    return state
 
 
 class PreviewController:
@@ -228,7 +159,7 @@ class PreviewController:
         name: str,
         configuration: Any = None,
     ) -> None:
-        self.name = name
+        self.name, self.dt = name, TIME_STEP
         self.parameters = configuration or parameters
         self._platform, self._mpc, self._planner = platform, parameters, planner
 

@@ -36,7 +36,7 @@ daqp: Any = _daqp
 Rows = NDArray[np.intp]
 
 TOLERANCE: Final = 1e-6
-"""Largest violation of a row that counts as none, in shares of a limit's range."""
+"""Largest violation of a row that counts as none, in shares of half a limit's range."""
 
 _REGULAR: Final = 1e-9
 """Added to the dual's diagonal, relative to its mean: rows may depend on each other."""
@@ -51,8 +51,8 @@ class Solution:
     Args:
         change: What it adds to the plan.
         active: Rows with a multiplier: flat by node, those of lower bounds behind all of the upper ones.
-        rounds: How often the dual was solved.
-        relaxed: Largest violation of a limit, in shares of its range.
+        rounds: Duals that were given to the solver.
+        relaxed: Largest violation of a limit, in shares of half its range.
         solved: Whether it is the minimum.
     """
 
@@ -74,7 +74,7 @@ def solve(
         about: The rows, linearised.
         bounds: Of the rows.
         guess: Rows that may hold, as ``Solution.active``.
-        rounds: Most times rows are added.
+        rounds: Most duals.
     """
     factor, failed = lapack.dpotrf(cost.hessian, lower=1)
     if failed:
@@ -93,11 +93,13 @@ def solve(
         working = np.concatenate([working, violated])
         if not len(working):
             return Solution(change, working, 0, 0.0, True)
+        if count == rounds:
+            break
         solved = _with_rows(problem, about, bounds, factor, free, working)
         if solved is None:
-            break
+            return _unsolved(problem, guess, count + 1)
         unknowns, multipliers = solved
-    return _unsolved(problem, guess)
+    return _unsolved(problem, guess, rounds)
 
 
 def _excess(values: Floats, bounds: Bounds) -> Floats:
@@ -134,5 +136,5 @@ _MOST: Final = 1e9
 """Bound of a multiplier that has none."""
 
 
-def _unsolved(problem: Problem, guess: Rows) -> Solution:
-    return Solution(problem.change(np.zeros(problem.size)), guess, 0, 0.0, False)
+def _unsolved(problem: Problem, guess: Rows, rounds: int = 0) -> Solution:
+    return Solution(problem.change(np.zeros(problem.size)), guess, rounds, 0.0, False)

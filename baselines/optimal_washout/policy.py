@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Final
 
 from ...envs.platform.machines import Cab
 from ...envs.precision import mat22
-from ...envs.simulator import TIME_STEP
 from ..washout import HighPass, WashoutParameters
 from ..washout.classical import kernel_parameters
 from ..washout.family import Family, make_family
@@ -73,29 +71,14 @@ OPTIMAL: Final[Family] = make_family(
 """Filters from the Riccati equation."""
 
 
-class OptimalWashout(WashoutPolicy):
-    """The optimal washout as a policy; its filters' memory is the policy's state.
-
-    Args:
-        parameters: A parameter set, a preset name or a YAML file.
-        cab: Where the driver sits on the machine.
-        dt: Time step, s.
+class OptimalWashout(WashoutPolicy[OptimalParameters]):
+    """The optimal washout as a policy; arguments as of :class:`WashoutPolicy`.
 
     Raises:
         ConfigurationError: no filter is optimal for these weights in floating point.
     """
 
-    def __init__(
-        self,
-        parameters: OptimalParameters | str | Path = "optimal-washout",
-        cab: Cab | None = None,
-        dt: float = TIME_STEP,
-    ) -> None:
-        if not isinstance(parameters, OptimalParameters):
-            parameters = load_optimal(parameters)
-        self.parameters = parameters
-        super().__init__(OPTIMAL, parameters, cab, dt)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt)
+    family = OPTIMAL
+    kind = OptimalParameters
+    load = staticmethod(load_optimal)
+    by_hand = "optimal-washout"

@@ -1,7 +1,6 @@
 """Plans kept from one run to the next, by a hash of all that they follow from.
 
-They lie in the folder ``MOTION_CUEING_CACHE`` of the environment, else in ``motion-cueing`` under
-``XDG_CACHE_HOME``, else under ``~/.cache``. The folder may be deleted at any time.
+They lie in the folder ``optimum`` of :func:`~..cache.cache_folder`.
 """
 
 from __future__ import annotations
@@ -9,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import zipfile
 import zlib
 from pathlib import Path
@@ -24,6 +22,7 @@ from ...envs.perception import VestibularModel
 from ...envs.platform import Platform
 from ...envs.settings import to_dict
 from ...envs.storage import write_bytes
+from ..cache import cache_folder
 from .options import OptimumOptions
 from .plan import Account, Plan
 
@@ -31,13 +30,9 @@ FORMULATION: Final = 3
 """Version of the program: what changes its solutions raises it."""
 
 
-def cache_folder() -> Path:
+def plans_folder() -> Path:
     """Where plans are kept."""
-    own = os.environ.get("MOTION_CUEING_CACHE")
-    if own:
-        return Path(own) / "optimum"
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "motion-cueing" / "optimum"
+    return cache_folder() / "optimum"
 
 
 def key_of(
@@ -94,7 +89,7 @@ def find(key: str, steps: int) -> Plan | None:
 
 
 def _path(key: str) -> Path:
-    return cache_folder() / f"{key}.npz"
+    return plans_folder() / f"{key}.npz"
 
 
 def _checksum(accelerations: NDArray[np.float64], start: NDArray[np.float64], account: str) -> str:

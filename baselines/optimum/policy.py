@@ -14,6 +14,7 @@ from ...envs.observation import OBSERVATION_SIZE, read
 from ...envs.perception import VestibularModel, get_vestibular_model
 from ...envs.platform import Platform, get_platform
 from ...envs.simulator import N_AXES
+from ..policy import checked_episode_start, checked_observation, wrong_state
 from .cache import find, keep, key_of
 from .options import OptimumOptions
 from .plan import Plan
@@ -121,16 +122,20 @@ class PlannedDrive:
             deterministic: No effect.
 
         Raises:
-            ConfigurationError: the observation is not one row: a plan is for one machine.
+            DataError: an argument has the wrong type or shape, or the observation is not finite.
+            ConfigurationError: the observation has more than one row: a plan is for one machine.
         """
-        rows = np.asarray(observation, dtype=np.float64)
+        rows = np.asarray(checked_observation(observation), dtype=np.float64)
         if rows.size != OBSERVATION_SIZE:
             raise ConfigurationError(
                 f"a plan is for one machine: the observation must have {OBSERVATION_SIZE} entries, found "
                 f"shape {rows.shape}"
             )
-        begins = state is None or (episode_start is not None and bool(np.any(episode_start)))
-        step = 0 if begins else int(state)
+        done = _checked_state(state)
+        begins = state is None or (
+            episode_start is not None and bool(checked_episode_start(episode_start, 1)[0])
+        )
+        step = 0 if begins else done
         if begins:
             self._begin_at(pose_of(rows.reshape(-1)))
         within = step < len(self.plan.accelerations)
@@ -140,6 +145,15 @@ class PlannedDrive:
     def _begin_at(self, pose: NDArray[np.float64]) -> None:
         if np.abs(pose - self.plan.start).max() > _SAME:
             self.plan = self._optimum.plan(self._cues, pose)
+
+
+def _checked_state(state: Any) -> int:
+    """The number of steps done; 0 for None."""
+    if state is None:
+        return 0
+    if isinstance(state, bool) or not isinstance(state, int) or state < 0:
+        raise wrong_state(state, 1)
+    return state
 
 
 def pose_of(observation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -164,7 +164,7 @@ class Problem:
         return Solution(
             nodes,
             mean_accelerations(nodes[:, -N_AXES:], self.options.steps)[: len(wanted)],
-            program.shares(x, given)[0] * self.options.steps,
+            program.errors(x, given) * self.options.steps,
             stats["return_status"] in _CONVERGED,
             int(stats["iter_count"]) + before,
             str(stats["return_status"]),

@@ -147,9 +147,9 @@ class Transcription:
         places = (repeated(part, blocks.node_size, nodes) for part in triplets(blocks.limits_hessian))
         return assembled((size, size), [(*places, nonzeros(values))])
 
-    def shares(self, x: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(2, intervals) costs of errors and of effort in each interval."""
+    def errors(self, x: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(intervals,) cost of the errors in each interval, without that of effort."""
         nodes = x.reshape(-1, self.blocks.node_size).T
         z = np.vstack([nodes[:, :-1], nodes[-N_AXES:, 1:]])
         wanted = p.reshape(-1, self.blocks.cost.size1_in(1)).T
-        return np.array(self.blocks.cost.map(self.intervals)(z, wanted))
+        return np.asarray(np.array(self.blocks.cost.map(self.intervals)(z, wanted))[0])

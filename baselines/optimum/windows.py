@@ -53,7 +53,7 @@ def windows(steps: int, options: OptimumOptions, dt: float) -> Iterator[Window]:
 
 @dataclass
 class _Tally:
-    """What an account counts."""
+    """What an account counts; ``played`` holds the cost of every time step, window by window."""
 
     cost: float = 0.0
     windows: int = 0
@@ -61,7 +61,7 @@ class _Tally:
     widened: int = 0
     unconverged: int = 0
     braked: int = 0
-    states: list[NDArray[np.void]] = field(default_factory=list)
+    played: list[Floats] = field(default_factory=list)
 
 
 class Planner:
@@ -113,14 +113,13 @@ class Planner:
             self._share = window.first / steps
             played = self._solved(window)
             self._tally.windows += 1
-            self._tally.states.append(played.states)
+            self._tally.played.append(self._costs(played.states))
             kept.append(played.accelerations)
         tally = self._tally
-        costs = np.concatenate([self._costs(states) for states in tally.states])
         account = Account(
             objective=self._options.objective,
             claimed=float((first + tally.cost) / (steps + 1)),
-            played=float((first + costs.sum()) / (steps + 1)),
+            played=float((first + np.concatenate(tally.played).sum()) / (steps + 1)),
             windows=tally.windows,
             iterations=tally.iterations,
             widened=tally.widened,

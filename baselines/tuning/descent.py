@@ -18,7 +18,7 @@ from ..washout import WashoutParameters
 from ..washout.batch import WashoutBatch
 from ..washout.classical import kernel_parameters
 from ..washout.structs import Parameters
-from .method import Found
+from .method import Found, Method
 from .objective import Objective
 from .space import WashoutSpace
 
@@ -30,8 +30,6 @@ SMALLEST_STEP: Final = 1e-4
 """A step that is halved below this has converged."""
 DRIVES: Final = 32
 """Drives of one gradient, drawn anew each time."""
-TRY_EVERY: Final = 5
-"""Gradients between trials on all drives."""
 _DECAY: Final = (0.8, 0.95)
 """Of Adam's two moments: a search has some hundred steps, not a million."""
 _TINY: Final = 1e-8
@@ -39,7 +37,7 @@ _DIFFERENCE: Final = 1e-5
 """Half the difference from which the derivative of the kernel's parameters by place is taken."""
 
 
-class Descent:
+class Descent(Method):
     """Adam in the unit cube, held to what is no worse on all drives.
 
     Args:
@@ -48,58 +46,51 @@ class Descent:
     """
 
     def __init__(self, start: Floats, seed: int) -> None:
+        super().__init__()
         self._seed = seed
         self._place = np.array(start)
-        self._step, self._count = STEP, 0
+        self._length = STEP
         self._forget()
-        self._best: tuple[float, Floats] | None = None
 
     def _forget(self) -> None:
         self._mean, self._square, self._since = np.zeros_like(self._place), np.zeros_like(self._place), 0
 
     @property
-    def best(self) -> tuple[float, Floats] | None:
-        """Lowest cost on all drives and its place."""
-        return self._best
-
-    @property
-    def tried(self) -> bool:
-        """Whether the last step was a trial."""
-        return self._count % (TRY_EVERY + 1) == 1
-
-    @property
     def converged(self) -> bool:
         """Whether the steps have become too small to matter."""
-        return self._step < SMALLEST_STEP
+        return self._length < SMALLEST_STEP
 
     @property
-    def _tries(self) -> bool:
-        return self._count % (TRY_EVERY + 1) == 0
+    def settings(self) -> dict[str, object]:
+        """Lengths of steps, drives of one, and Adam's constants."""
+        return super().settings | {
+            "step": [STEP, SMALLEST_STEP],
+            "drives": DRIVES,
+            "decay": [*_DECAY, _TINY],
+            "difference": _DIFFERENCE,
+        }
 
-    def measure(self, space: WashoutSpace, objective: Objective) -> Found:
-        """The cost on all drives, or J and its gradient on a few of them."""
-        if self._tries:
-            whole = objective.judge([space.decode(self._place)])
-            return Found(objective.hours(), tuple(whole.cost.tolist()))
+    def _trial(self, space: WashoutSpace, objective: Objective) -> Found:
+        whole = objective.judge([space.decode(self._place)])
+        return Found(objective.hours(), tuple(whole.cost.tolist()), tuple(whole.violation.tolist()))
+
+    def _compare(self, found: Found) -> None:
+        """Go back to the best, with half the step, from what is no better."""
+        (cost,), (violation,) = found.values, found.violations
+        if self._improves(violation, cost, self._place) or self._best is None:
+            return
+        self._place = self._best[2].copy()
+        self._length *= 0.5
+        self._forget()
+
+    def _step(self, space: WashoutSpace, objective: Objective) -> Found:
+        """J and its gradient on a few of the drives."""
         drawn = objective.draw(DRIVES, (self._seed, self._count))
         cost, gradient = place_gradient(space, self._place, objective, drawn)
         return Found(objective.hours(drawn), (cost, *gradient.tolist()))
 
-    def tell(self, found: Found) -> None:
-        """Compare with the best, or go one step down."""
-        if self._tries:
-            self._compare(found.values[0])
-        else:
-            self._descend(np.array(found.values[1:]))
-        self._count += 1
-
-    def _compare(self, cost: float) -> None:
-        if self._best is None or cost < self._best[0]:
-            self._best = cost, self._place.copy()
-            return
-        self._place = self._best[1].copy()
-        self._step *= 0.5
-        self._forget()
+    def _move(self, values: tuple[float, ...]) -> None:
+        self._descend(np.array(values[1:]))
 
     def _descend(self, gradient: Floats) -> None:
         self._since += 1
@@ -107,7 +98,7 @@ class Descent:
         self._square += (1.0 - _DECAY[1]) * (gradient**2 - self._square)
         mean = self._mean / (1.0 - _DECAY[0] ** self._since)
         square = self._square / (1.0 - _DECAY[1] ** self._since)
-        self._place = np.clip(self._place - self._step * mean / (np.sqrt(square) + _TINY), 0.0, 1.0)
+        self._place = np.clip(self._place - self._length * mean / (np.sqrt(square) + _TINY), 0.0, 1.0)
 
 
 def place_gradient(

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .method import Found
+from .method import Found, Method
 from .objective import Objective
 from .space import WashoutSpace
 
@@ -23,13 +23,11 @@ DRIVES: Final = 24
 """Drives of a generation, drawn anew for each, the same for all its sets."""
 GUARDS: Final = 24
 """Most drives that are added because limits were met in them: those with most time at a limit so far."""
-TRY_EVERY: Final = 5
-"""Generations between trials on all drives."""
 _MARGIN: Final = 0.02
 """The start's least distance from the faces of the cube, so that the first spread is not cut there."""
 
 
-class Evolution:
+class Evolution(Method):
     """CMA-ES in the unit cube.
 
     Now and then the middle of the distribution and the best of the last generation are tried on all drives.
@@ -44,6 +42,7 @@ class Evolution:
         # Not with the module: the package is loaded only by who tunes.
         import cma
 
+        super().__init__()
         random = np.random.default_rng(seed)
         options: dict[str, Any] = {
             "bounds": [0.0, 1.0],
@@ -52,21 +51,10 @@ class Evolution:
             "verbose": -9,
         }
         self._strategy = cma.CMAEvolutionStrategy(np.clip(start, _MARGIN, 1.0 - _MARGIN), STEP, options)
-        self._seed, self._count = seed, 0
-        self._best: tuple[float, Floats] | None = None
+        self._seed, self._version = seed, str(cma.__version__)
         self._limited = np.zeros(0)
         self._tried = [np.array(start)]
         self._asked = self._ask()
-
-    @property
-    def best(self) -> tuple[float, Floats] | None:
-        """Lowest cost on all drives and its place."""
-        return self._best
-
-    @property
-    def tried(self) -> bool:
-        """Whether the last step was a trial."""
-        return self._count % (TRY_EVERY + 1) == 1
 
     @property
     def converged(self) -> bool:
@@ -74,43 +62,46 @@ class Evolution:
         return bool(self._strategy.stop())
 
     @property
-    def _tries(self) -> bool:
-        return self._count % (TRY_EVERY + 1) == 0
+    def settings(self) -> dict[str, object]:
+        """The first spread, drives and guards of a generation, and the version of the package cma."""
+        own = {"step": [STEP, _MARGIN], "drives": DRIVES, "guards": GUARDS, "cma": self._version}
+        return super().settings | own
 
     @property
     def _guards(self) -> list[int]:
         worst = np.argsort(-self._limited, kind="stable")[:GUARDS]
         return [int(i) for i in worst if self._limited[i] > 0.0]
 
-    def measure(self, space: WashoutSpace, objective: Objective) -> Found:
-        """Costs of a generation; or of what is tried on all drives, and the time at a limit in each drive."""
-        if self._tries:
-            whole = objective.judge([space.decode(place) for place in self._tried])
-            limited = whole.limited.sum(axis=0)
-            return Found(objective.hours() * len(self._tried), (*whole.cost.tolist(), *limited.tolist()))
+    def _trial(self, space: WashoutSpace, objective: Objective) -> Found:
+        """Costs and violations of what is tried; behind the costs the time at a limit in each drive."""
+        whole = objective.judge([space.decode(place) for place in self._tried])
+        limited = whole.limited.sum(axis=0)
+        return Found(
+            objective.hours() * len(self._tried),
+            (*whole.cost.tolist(), *limited.tolist()),
+            tuple(whole.violation.tolist()),
+        )
+
+    def _compare(self, found: Found) -> None:
+        split = len(self._tried)
+        for cost, violation, place in zip(found.values[:split], found.violations, self._tried, strict=True):
+            self._improves(violation, cost, place)
+        limited = np.array(found.values[split:])
+        self._limited = limited + (self._limited if len(self._limited) else 0.0)
+
+    def _step(self, space: WashoutSpace, objective: Objective) -> Found:
+        """Costs of a generation."""
         drawn = objective.draw(DRIVES, (self._seed, self._count))
         guards = [i for i in self._guards if i not in drawn]
         cost = objective.judge([space.decode(place) for place in self._asked], drawn, guards).cost
         return Found(objective.hours([*drawn, *guards]) * len(self._asked), tuple(cost.tolist()))
 
-    def tell(self, found: Found) -> None:
-        """Take in a trial; or select, adapt, and draw the next generation."""
-        if self._tries:
-            self._compare(found.values)
-        else:
-            self._strategy.tell(self._asked, list(found.values))
-            fittest = self._asked[int(np.argmin(found.values))]
-            self._tried = [np.asarray(self._strategy.result.xfavorite), fittest]
-            self._asked = self._ask()
-        self._count += 1
-
-    def _compare(self, values: tuple[float, ...]) -> None:
-        split = len(self._tried)
-        for cost, place in zip(values[:split], self._tried, strict=True):
-            if self._best is None or cost < self._best[0]:
-                self._best = cost, place
-        limited = np.array(values[split:])
-        self._limited = limited + (self._limited if len(self._limited) else 0.0)
+    def _move(self, values: tuple[float, ...]) -> None:
+        """Select, adapt, and draw the next generation."""
+        self._strategy.tell(self._asked, list(values))
+        fittest = self._asked[int(np.argmin(values))]
+        self._tried = [np.asarray(self._strategy.result.xfavorite), fittest]
+        self._asked = self._ask()
 
     def _ask(self) -> list[Floats]:
         return [np.asarray(place) for place in self._strategy.ask()]

@@ -20,7 +20,7 @@ Measure = Literal["J", "perceived"]
 """What is averaged over the drives: J, or J of what the driver senses."""
 
 LIMIT_STEP: Final = 1.0
-"""Added to J of a set that meets a limit where it may not, however briefly."""
+"""Added to J of a set that meets a limit where it may not, however briefly: a search keeps away from it."""
 LIMIT_SLOPE: Final = 1000.0
 """Times the share of time at a limit, and added, too: 0.1 % costs 1, so that the way back is downhill."""
 _BROKEN: Final = 1e9
@@ -114,5 +114,8 @@ class Objective:
 
 
 def penalty(at_limit: Floats) -> Floats:
-    """What time at a limit costs: nothing without, else more than what it could gain."""
+    """What time at a limit costs: nothing without, else a step and a slope.
+
+    J may gain more than that. The result of a search is protected otherwise: see :attr:`.method.Method.best`.
+    """
     return np.asarray(np.where(at_limit > 0.0, LIMIT_STEP + LIMIT_SLOPE * at_limit, 0.0))

@@ -6,11 +6,9 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ...envs.errors import DataError
 from ...envs.settings import configuration, from_dict, to_dict
@@ -19,11 +17,9 @@ from ..families import AnyWashout
 from .descent import Descent
 from .evolution import Evolution
 from .method import Found, Method
-from .objective import Objective
+from .objective import LIMIT_SLOPE, LIMIT_STEP, Objective
 from .options import TuningOptions
 from .space import WashoutSpace
-
-Floats = NDArray[np.float64]
 
 
 @configuration
@@ -34,7 +30,7 @@ class Record:
         options: Of the search.
         platform: Name or file of the machine.
         car: Name or file of the car.
-        inputs: Checksum of drives and machine.
+        inputs: Checksum of all that must be the same for that, see :func:`checksum`.
         found: What its steps found.
         command: That began it, for people.
     """
@@ -84,17 +80,20 @@ class Search:
         self.options, self.objective, self.path, self.command = options, objective, path, command
         self.space = WashoutSpace(options.start)
         self.found: list[Found] = []
-        self._names, self._inputs = names, checksum(objective)
         self._method = _method(options, self.space)
+        self._names, self._inputs = names, checksum(objective, self.space, self._method)
 
     def resume(self, record: Record) -> None:
         """Go through the steps of an earlier session again, without simulating.
 
         Raises:
-            DataError: the drives or the machine have changed since, or the record does not fit.
+            DataError: drives, machine or the search itself have changed since, or the record does not fit.
         """
         if record.inputs != self._inputs:
-            raise DataError("drives or machine have changed since this search was begun; begin it anew")
+            raise DataError(
+                "drives, machine, ranges or settings of the search, or the version of motion-cueing-gym or "
+                "cma have changed since this search was begun; begin it anew, with another --out"
+            )
         try:
             for found in record.found:
                 self._take(found)
@@ -160,13 +159,30 @@ def load_record(path: Path) -> Record:
     return from_dict(Record, values, str(path))
 
 
-def checksum(objective: Objective) -> str:
-    """Of drives and machine."""
-    sum_ = hashlib.sha256(json.dumps(to_dict(objective.platform), sort_keys=True).encode())
-    for drive in objective.drives:
-        sum_.update(np.ascontiguousarray(drive.specific_force).tobytes())
-        sum_.update(np.ascontiguousarray(drive.angular_velocity).tobytes())
-    return sum_.hexdigest()
+def checksum(objective: Objective, space: WashoutSpace, method: Method) -> str:
+    """SHA-256 of what decides, beside the options, what the steps of a search find and mean.
+
+    Drives and where limits may be met in them, the machine, what costs, every coordinate with its range, the
+    constants of the method, and versions.
+    """
+    parts = {
+        "package": _version(),
+        "drives": [drive.digest() for drive in objective.drives],
+        "spared": sorted(objective.spared),
+        "machine": to_dict(objective.platform),
+        "limits": [LIMIT_STEP, LIMIT_SLOPE],
+        "space": [to_dict(coordinate) for coordinate in space.coordinates],
+        "method": method.settings,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _version() -> str:
+    """Of this package; from a folder that was not installed it has none."""
+    try:
+        return version("motion-cueing-gym")
+    except PackageNotFoundError:
+        return ""
 
 
 def _method(options: TuningOptions, space: WashoutSpace) -> Method:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ...envs.errors import DataError
 from ...envs.observation import OBSERVATION_SIZE
 from ...envs.platform.machines import Cab
-from ...envs.precision import FLOAT, real, vec9
+from ...envs.precision import real, vec9
 from ...envs.simulator import N_AXES, TIME_STEP
-from ..policy import Array
+from ..policy import Array, checked_episode_start, checked_observation, wrong_state
 from .classical import CLASSICAL
 from .family import Family, FamilyParameters, start_pose
 from .parameters import WashoutParameters, load_washout
+
+P = TypeVar("P", bound=FamilyParameters)
 
 
 class _Buffers:
@@ -41,40 +42,9 @@ class _Buffers:
         self.results = self.after.numpy(), self.action.numpy()
 
 
-def checked_observation(observation: Any) -> Array:
-    """Observations as the kernels' numbers.
-
-    Raises:
-        DataError: they are not (n, OBSERVATION_SIZE) or (OBSERVATION_SIZE,) finite numbers.
-    """
-    try:
-        values = np.asarray(observation, dtype=FLOAT)
-    except (TypeError, ValueError):
-        raise DataError(
-            f"observation is not numeric; give an array of (n, {OBSERVATION_SIZE}) numbers"
-        ) from None
-    if values.ndim not in (1, 2) or values.shape[-1] != OBSERVATION_SIZE or not len(values):
-        raise DataError(f"observation has shape {values.shape}, expected (n, {OBSERVATION_SIZE})")
-    if not np.isfinite(values).all():
-        raise DataError("observation is not finite")
-    return values
-
-
-def _checked_start(episode_start: Any, n: int) -> Array:
-    flags = np.asarray(episode_start)
-    if flags.dtype != np.bool_ or flags.shape != (n,):
-        raise DataError(
-            f"episode_start is {_kind(flags)}; give {n} booleans, one an observation, or None in mid-episode"
-        )
-    return flags
-
-
 def _checked_state(state: Any, dtype: np.dtype[Any], n: int) -> Array:
     if not isinstance(state, np.ndarray) or state.dtype != dtype or state.shape != (n,):
-        raise DataError(
-            f"state is {_kind(state)}; give what the last call for these {n} observations returned, "
-            "or None to begin"
-        )
+        raise wrong_state(state, n)
     return state
 
 
@@ -83,35 +53,47 @@ def _as_bytes(memory: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(memory).view(np.uint8)
 
 
-def _kind(values: Any) -> str:
-    if not isinstance(values, np.ndarray):
-        return f"of type {type(values).__name__}"
-    held = "washout memory" if values.dtype.names else str(values.dtype)
-    return f"an array of {held} of shape {values.shape}"
-
-
-class WashoutPolicy:
+class WashoutPolicy(Generic[P]):
     """An algorithm of the washout kind as a policy; its memory is the policy's state.
 
+    A subclass says which algorithm it is.
+
     Args:
-        family: The algorithm.
-        parameters: Its parameter set.
+        parameters: A parameter set, a preset name or a YAML file; default: the set by hand.
         cab: Where the driver sits on the machine.
         dt: Time step, s.
+
+    Attributes:
+        family: The algorithm as kernels.
+        kind: Class of its parameter sets.
+        load: A parameter set by preset name or from a YAML file.
+        by_hand: Preset name of the set by hand.
     """
 
-    def __init__(self, family: Family, parameters: FamilyParameters, cab: Cab | None, dt: float) -> None:
-        self.name = parameters.name
+    family: ClassVar[Family]
+    kind: ClassVar[type[Any]]
+    load: ClassVar[staticmethod[[str | Path], Any]]
+    by_hand: ClassVar[str]
+
+    def __init__(
+        self, parameters: P | str | Path | None = None, cab: Cab | None = None, dt: float = TIME_STEP
+    ) -> None:
+        given: Any = self.by_hand if parameters is None else parameters
+        self.parameters: P = given if isinstance(given, self.kind) else self.load(given)
+        self.name = self.parameters.name
         self.cab = cab or Cab()
         self.dt = dt
-        self._family = family
-        self._start = start_pose(parameters)
+        self._start = start_pose(self.parameters)
         self._kernel_parameters = wp.array(
-            [family.values(parameters, self.cab, dt)], dtype=family.parameters, device="cpu"
+            [self.family.values(self.parameters, self.cab, dt)], dtype=self.family.parameters, device="cpu"
         )
         self._buffers: dict[int, _Buffers] = {}
         # Compiled and loaded now, so that the first step of a drive takes no longer than the others.
         self._make_buffers(1).launch.launch()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made anew: Warp's arrays cannot be."""
+        return type(self), (self.parameters, self.cab, self.dt)
 
     @property
     def start(self) -> Array:
@@ -135,7 +117,7 @@ class WashoutPolicy:
         buffers = self._buffers.get(n) or self._make_buffers(n)
         memory, action = buffers.results
         if episode_start is not None:
-            episode_start = _checked_start(episode_start, n)
+            episode_start = checked_episode_start(episode_start, n)
         if state is not None:
             _as_bytes(buffers.views["memory"])[...] = _as_bytes(_checked_state(state, memory.dtype, n))
         buffers.views["observation"][...] = observation
@@ -151,30 +133,14 @@ class WashoutPolicy:
         return self._buffers_with(n, self._kernel_parameters, parameters_of)
 
     def _buffers_with(self, n: int, parameters: Any, parameters_of: Any) -> _Buffers:
-        self._buffers[n] = _Buffers(self._family, n, parameters, parameters_of, self.dt)
+        self._buffers[n] = _Buffers(self.family, n, parameters, parameters_of, self.dt)
         return self._buffers[n]
 
 
-class ClassicalWashout(WashoutPolicy):
-    """The paper's algorithm as a policy; its memory is the policy's state.
+class ClassicalWashout(WashoutPolicy[WashoutParameters]):
+    """The paper's algorithm as a policy; arguments as of :class:`WashoutPolicy`."""
 
-    Args:
-        parameters: A parameter set, a preset name or a YAML file.
-        cab: Where the driver sits on the machine.
-        dt: Time step, s.
-    """
-
-    def __init__(
-        self,
-        parameters: WashoutParameters | str | Path = "classical",
-        cab: Cab | None = None,
-        dt: float = TIME_STEP,
-    ) -> None:
-        if not isinstance(parameters, WashoutParameters):
-            parameters = load_washout(parameters)
-        self.parameters = parameters
-        super().__init__(CLASSICAL, parameters, cab, dt)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt)
+    family = CLASSICAL
+    kind = WashoutParameters
+    load = staticmethod(load_washout)
+    by_hand = "classical"

@@ -13,10 +13,10 @@ from ...envs.errors import ActionError, ConfigurationError, DataError
 from ...envs.observation import OBSERVATION_SIZE
 from ...envs.platform.machines import Cab
 from ...envs.simulator import TIME_STEP
-from ..policy import Array
+from ..policy import Array, checked_observation
 from .classical import kernel_parameters
 from .parameters import WashoutParameters
-from .policy import ClassicalWashout, checked_observation
+from .policy import ClassicalWashout
 from .structs import Parameters
 
 KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -34,7 +34,8 @@ class ScheduledWashout(ClassicalWashout):
     """A washout whose cue scale and break frequencies an agent turns, each between 1 / span and span times.
 
     Args:
-        parameters: A parameter set, a preset name or a YAML file: where all gains are 0.
+        parameters: A parameter set, a preset name or a YAML file, default the set by hand: where all gains
+            are 0.
         cab: Where the driver sits on the machine.
         dt: Time step, s.
         span: Largest factor, at a gain of 1.
@@ -45,7 +46,7 @@ class ScheduledWashout(ClassicalWashout):
 
     def __init__(
         self,
-        parameters: WashoutParameters | str | Path = "classical",
+        parameters: WashoutParameters | str | Path | None = None,
         cab: Cab | None = None,
         dt: float = TIME_STEP,
         span: float = 2.0,

@@ -153,6 +153,10 @@ def test_no_cue_however_large_throws_a_gain_beyond_its_limits_or_makes_it_swing(
     for kind in ("force", "rate"):
         assert found[kind].min() >= 0.1
         assert found[kind].max() <= 1.2
+        # A gain that swings goes up, down, up and so on for ever; one that follows the cue turns with it.
+        turns = np.diff(np.sign(np.diff(found[kind], axis=0)), axis=0) != 0.0
+        assert not np.any(turns[2:] & turns[1:-1] & turns[:-2])
+    assert np.ptp(found["force"][:, :2], axis=0) == pytest.approx([1.1, 1.1])  # from limit to limit
 
 
 def test_dear_displacement_lowers_the_gain():

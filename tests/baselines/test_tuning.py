@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cma
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motion_cueing.baselines.tuning import descent, evolution
-from motion_cueing.baselines.tuning.coordinates import Coordinate
+from motion_cueing.baselines.tuning import evolution, method
+from motion_cueing.baselines.tuning import search as search_module
+from motion_cueing.baselines.tuning import space as space_module
+from motion_cueing.baselines.tuning.coordinates import COORDINATES, Coordinate
 from motion_cueing.baselines.tuning.descent import Descent, place_gradient
 from motion_cueing.baselines.tuning.evolution import Evolution
 from motion_cueing.baselines.tuning.method import Found
@@ -158,11 +161,10 @@ def test_a_small_search_improves_on_its_start_and_gives_the_same_again():
     assert first.status.best == pytest.approx(found.cost[0], rel=1e-3)
 
 
-@pytest.mark.parametrize("method", ["cma", "gradient"])
-def test_a_search_that_is_taken_up_again_ends_with_the_same_bits(method, tmp_path, monkeypatch):
-    monkeypatch.setattr(descent, "TRY_EVERY", 2)
-    monkeypatch.setattr(evolution, "TRY_EVERY", 2)
-    options = {"method": method, "budget": (14 if method == "cma" else 1) * 5 * 2.0 / 3600.0}
+@pytest.mark.parametrize("way", ["cma", "gradient"])
+def test_a_search_that_is_taken_up_again_ends_with_the_same_bits(way, tmp_path, monkeypatch):
+    monkeypatch.setattr(method, "TRY_EVERY", 2)
+    options = {"method": way, "budget": (14 if way == "cma" else 1) * 5 * 2.0 / 3600.0}
     short = [trace(1.0, lambda t: np.column_stack([0.5 * np.sin(3.0 * t), 0.0 * t]))] * 2
     whole = search(drives=short, **options)
     whole.run()
@@ -186,7 +188,7 @@ def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path)
     begun = search(path, budget=1e-9)
     begun.run()
     record = load_record(path)
-    with pytest.raises(DataError, match="drives or machine have changed"):
+    with pytest.raises(DataError, match="drives, machine, ranges or settings of the search, or the version"):
         search(drives=DRIVES[:1]).resume(record)
     begun = search()
     begun.run(stop=lambda: len(begun.found) > 1)
@@ -199,6 +201,46 @@ def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path)
     path.write_text('{"options": 3}')
     with pytest.raises(ConfigurationError, match="options"):
         load_record(path)
+
+
+def wider(coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
+    """The same with another end of the last range."""
+    return (*coordinates[:-1], replace(coordinates[-1], high=2.0 * coordinates[-1].high))
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "value"),
+    [
+        (space_module, "COORDINATES", {"classical": wider(COORDINATES["classical"])}),
+        (space_module, "COORDINATES", {"classical": COORDINATES["classical"][::-1]}),
+        (evolution, "STEP", 0.2),
+        (evolution, "DRIVES", 12),
+        (evolution, "GUARDS", 12),
+        (method, "TRY_EVERY", 4),
+        (search_module, "LIMIT_SLOPE", 1.0),
+        (search_module, "version", lambda package: "99.0"),
+        (cma, "__version__", "99.0"),
+    ],
+)
+def test_a_search_is_not_taken_up_by_another_one(monkeypatch, where, name, value):
+    begun = search(budget=1e-9)
+    begun.run()
+    record = Record(begun.options, "paper", "sedan", begun._inputs, tuple(begun.found))
+    search().resume(record)
+    monkeypatch.setattr(where, name, value)
+    with pytest.raises(DataError, match="have changed since this search was begun; begin it anew"):
+        search().resume(record)
+
+
+@pytest.mark.parametrize("name", ["specific_force", "angular_velocity", "angular_acceleration", "time"])
+def test_a_search_is_not_taken_up_with_other_cues(name):
+    other = {"angular_acceleration": np.array(DRIVES[1].angular_acceleration)}
+    other |= {name: getattr(DRIVES[1], name) * (1.0 + 1e-6)}
+    if name.startswith("angular"):
+        other[name] = other[name] + 1e-9
+    changed = search(drives=[DRIVES[0], replace(DRIVES[1], **other)])
+    assert changed._inputs != search()._inputs
+    assert search(drives=[DRIVES[0], replace(DRIVES[1], name="other")])._inputs == search()._inputs
 
 
 def test_the_gradient_in_the_cube_is_that_of_differences():
@@ -218,36 +260,62 @@ def test_the_gradient_in_the_cube_is_that_of_differences():
 
 def test_descent_goes_down_and_never_keeps_what_is_worse():
     goal = np.linspace(0.2, 0.8, 4)
-    method = Descent(np.full(4, 0.5), seed=0)
+    way = Descent(np.full(4, 0.5), seed=0)
 
     def bowl(place):
         """In place of a simulation."""
         return float(np.sum((place - goal) ** 2))
 
     costs = []
-    while not method.converged:
-        place = method._place
-        if method._tries:
-            method.tell(Found(0.0, (bowl(place),)))
-            costs.append(method.best[0])
+    while not way.converged:
+        place = way._place
+        if way._tries:
+            way.tell(Found(0.0, (bowl(place),), (0.0,)))
+            costs.append(way.best[0])
         else:
-            method.tell(Found(0.0, (bowl(place), *(2.0 * (place - goal)).tolist())))
+            way.tell(Found(0.0, (bowl(place), *(2.0 * (place - goal)).tolist())))
     assert costs == sorted(costs, reverse=True)
-    np.testing.assert_allclose(method.best[1], goal, atol=0.01)
+    np.testing.assert_allclose(way.best[1], goal, atol=0.01)
+
+
+def test_descent_goes_back_from_a_set_that_meets_a_limit_however_cheap():
+    way = Descent(np.full(2, 0.5), seed=0)
+    way.tell(Found(0.0, (9.0,), (0.0,)))
+    for _ in range(method.TRY_EVERY):
+        way.tell(Found(0.0, (9.0, 1.0, -1.0)))
+    assert way._place.tolist() != [0.5, 0.5]
+    way.tell(Found(0.0, (1.01,), (1e-5,)))
+    assert (way.best[0], way._place.tolist()) == (9.0, [0.5, 0.5])
+
+
+def test_of_sets_tried_the_best_meets_no_limit_if_any_does_not():
+    way = Evolution(np.full(3, 0.5), seed=0)
+    way.tell(Found(0.0, (5.0, 0.1), (0.1,)))
+    assert way.best[0] == 5.0  # there is no other yet
+
+    def tried(costs, violations):
+        for _ in range(method.TRY_EVERY):
+            way.tell(Found(0.0, tuple(range(len(way._asked)))))
+        way.tell(Found(0.0, (*costs, 0.0), violations))
+        return way.best[0]
+
+    assert tried((8.0, 4.0), (0.0, 1e-5)) == 8.0
+    assert tried((1.0, 8.0), (1e-9, 0.0)) == 8.0
+    assert tried((9.0, 7.0), (0.0, 0.0)) == 7.0
 
 
 def test_drives_in_which_limits_are_met_become_guards():
-    method = Evolution(np.full(3, 0.5), seed=0)
+    way = Evolution(np.full(3, 0.5), seed=0)
     limited = np.zeros(40)
     limited[[3, 7]] = 0.1, 0.2
-    method.tell(Found(0.0, (5.0, *limited)))
-    assert method._guards == [7, 3]
-    for _ in range(evolution.TRY_EVERY):
-        method.tell(Found(0.0, tuple(range(len(method._asked)))))
+    way.tell(Found(0.0, (5.0, *limited), (0.3,)))
+    assert way._guards == [7, 3]
+    for _ in range(method.TRY_EVERY):
+        way.tell(Found(0.0, tuple(range(len(way._asked)))))
     limited[[3, 7]] = 0.2, 0.0
-    method.tell(Found(0.0, (6.0, 7.0, *limited)))
-    assert method._guards == [3, 7]
-    assert method.best[0] == 5.0
+    way.tell(Found(0.0, (6.0, 7.0, *limited), (0.1, 0.1)))
+    assert way._guards == [3, 7]
+    assert way.best[0] == 5.0
 
 
 @pytest.mark.parametrize(

@@ -136,12 +136,24 @@ def test_a_solver_that_gives_up_is_told(monkeypatch):
     monkeypatch.setattr(solver_module, "daqp", Failing)
     solution = Case(7, 0.3).solve()
     assert not solution.solved
+    assert solution.rounds == 1
     assert not np.any(solution.change.acceleration)
 
 
-@pytest.mark.parametrize("rounds", [1, 30])
-def test_rounds_are_bounded(rounds):
+@pytest.mark.parametrize("rounds", [1, 2, 30])
+def test_rounds_are_the_duals_that_were_solved_and_bounded(monkeypatch, rounds):
+    class Counting:
+        calls = 0
+
+        @classmethod
+        def solve(cls, *arguments):
+            cls.calls += 1
+            return daqp.solve(*arguments)
+
+    daqp = solver_module.daqp
+    monkeypatch.setattr(solver_module, "daqp", Counting)
     case = Case(7, 0.01)
     solution = solve(case.problem, case.cost, case.about, case.bounds, NONE, rounds)
-    assert solution.rounds <= rounds
+    assert solution.rounds == Counting.calls <= rounds
     assert solution.solved == (rounds == 30)
+    assert solution.solved or Counting.calls == rounds

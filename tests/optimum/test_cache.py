@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from motion_cueing.baselines.cache import cache_folder
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
-from motion_cueing.baselines.optimum.cache import cache_folder, find, keep, key_of
+from motion_cueing.baselines.optimum.cache import find, keep, key_of, plans_folder
 from motion_cueing.baselines.optimum.plan import Account, Plan
 from motion_cueing.baselines.optimum.windows import Planner
 from motion_cueing.envs.perception import get_vestibular_model
@@ -28,7 +29,7 @@ def plan() -> Plan:
 def test_a_plan_is_made_once(monkeypatch):
     drive, optimum = surge(1.0, 1.0), Optimum(options=OPTIONS)
     first = optimum.plan(drive)
-    assert len(list(cache_folder().iterdir())) == 1
+    assert len(list(plans_folder().iterdir())) == 1
 
     def refuse(self):
         raise AssertionError("solved again")
@@ -44,7 +45,7 @@ def test_a_plan_is_made_once(monkeypatch):
 @pytest.mark.parametrize("damage", [b"", b"not a plan", None], ids=["empty", "foreign", "one byte"])
 def test_a_damaged_file_is_no_plan(plan, damage):
     keep("key", plan)
-    path = cache_folder() / "key.npz"
+    path = plans_folder() / "key.npz"
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(bytes(content) if damage is None else damage)
@@ -53,7 +54,7 @@ def test_a_damaged_file_is_no_plan(plan, damage):
 
 def test_every_cut_of_a_file_is_no_plan(plan):
     keep("key", plan)
-    path = cache_folder() / "key.npz"
+    path = plans_folder() / "key.npz"
     content = path.read_bytes()
     for length in range(0, len(content), 97):
         path.write_bytes(content[:length])
@@ -69,7 +70,7 @@ def test_a_plan_of_another_length_is_not_taken(plan):
 def test_a_damaged_plan_is_made_anew():
     drive, optimum = surge(0.5, 1.0), Optimum(options=OPTIONS)
     first = optimum.plan(drive)
-    (path,) = cache_folder().iterdir()
+    (path,) = plans_folder().iterdir()
     path.write_bytes(b"PK")
     assert np.array_equal(optimum.plan(drive).accelerations, first.accelerations)
     assert path.stat().st_size > 1000
@@ -86,16 +87,25 @@ def test_whatever_a_plan_follows_from_is_in_its_key():
     drive, machine, model = surge(1.0, 1.0), get_platform("paper"), get_vestibular_model("zacharias")
     rest = np.zeros(9)
     given = (machine, OPTIONS, model, drive, rest)
-    other_force = np.array(drive.specific_force)
-    other_force[3, 1] += 1e-12
+    force, rate, acceleration = (
+        np.array(values)
+        for values in (drive.specific_force, drive.angular_velocity, drive.angular_acceleration)
+    )
+    for values in (force, rate, acceleration):
+        values[3, 1] += 1e-12
+    slower = replace(drive, time=1.5 * drive.time, angular_acceleration=np.array(drive.angular_acceleration))
     others = [
         (machine.without_turntable(), OPTIONS, model, drive, rest),
         (machine, replace(OPTIONS, margin=0.02), model, drive, rest),
+        (machine, replace(OPTIONS, objective="perceived"), model, drive, rest),
         (machine, OPTIONS, get_vestibular_model("telban"), drive, rest),
-        (machine, OPTIONS, model, replace(drive, specific_force=other_force), rest),
+        (machine, OPTIONS, model, replace(drive, specific_force=force), rest),
+        (machine, OPTIONS, model, replace(drive, angular_velocity=rate), rest),
+        (machine, OPTIONS, model, replace(drive, angular_acceleration=acceleration), rest),
+        (machine, OPTIONS, model, slower, rest),
         (machine, OPTIONS, model, drive, rest + 1e-9),
     ]
-    assert len({key_of(*arguments) for arguments in (given, *others)}) == 6
+    assert len({key_of(*arguments) for arguments in (given, *others)}) == 10
     renamed = (replace(machine, name="mine"), OPTIONS, model, replace(drive, name="other"), rest)
     assert key_of(*renamed) == key_of(*given)
 
@@ -103,7 +113,10 @@ def test_whatever_a_plan_follows_from_is_in_its_key():
 def test_the_folder_follows_the_environment(monkeypatch, tmp_path):
     monkeypatch.delenv("MOTION_CUEING_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache_folder() == tmp_path / "motion-cueing" / "optimum"
+    assert cache_folder() == tmp_path / "motion-cueing"
+    assert plans_folder() == tmp_path / "motion-cueing" / "optimum"
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert cache_folder() == tmp_path / "home" / ".cache" / "motion-cueing" / "optimum"
+    assert cache_folder() == tmp_path / "home" / ".cache" / "motion-cueing"
+    monkeypatch.setenv("MOTION_CUEING_CACHE", str(tmp_path / "mine"))
+    assert (cache_folder(), plans_folder()) == (tmp_path / "mine", tmp_path / "mine" / "optimum")

@@ -17,7 +17,8 @@ from motion_cueing.baselines.optimum.problem import Problem
 from motion_cueing.baselines.optimum.windows import Planner, windows
 from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.cues import CueTrace
-from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.simulator import Simulator
@@ -274,7 +275,24 @@ def test_wrong_input_is_refused():
         Optimum().for_drive(np.zeros((10, 3)))
     policy = Optimum(options=COARSE).for_drive(surge(0.5, 0.5))
     with pytest.raises(ConfigurationError, match="one machine"):
-        policy.predict(np.zeros((2, 52)))
+        policy.predict(np.zeros((2, OBSERVATION_SIZE)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"observation": np.full(OBSERVATION_SIZE, np.nan)}, "observation is not finite"),
+        ({"observation": np.zeros((1, 5))}, "observation has shape"),
+        ({"state": "begin"}, "state is of type str; give what the last call"),
+        ({"state": -1}, "state is of type int; give what the last call"),
+        ({"episode_start": np.zeros(3, dtype=bool)}, "episode_start is an array of bool"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments, told):
+    policy = Optimum(options=COARSE).for_drive(surge(0.5, 0.5))
+    good = {"observation": np.zeros(OBSERVATION_SIZE), "state": 3}
+    with pytest.raises(DataError, match=told):
+        policy.predict(**(good | arguments))
 
 
 def test_a_drive_of_two_samples_has_a_plan():
