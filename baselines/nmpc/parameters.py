@@ -18,7 +18,7 @@ class NmpcParameters:
         algorithm: What a file of such parameters says it is.
         mpc: Horizon, forecast, weights and margins, as of the linear one.
         iterations: Most programs a plan. 1 is the real-time iteration, which is the linear controller.
-        tolerance: A program that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
+        tolerance: A step that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
     """
 
     algorithm: Literal["nmpc"] = "nmpc"

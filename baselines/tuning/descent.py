@@ -77,11 +77,10 @@ class Descent(Method):
     def _compare(self, found: Found) -> None:
         """Go back to the best, with half the step, from what is no better."""
         (cost,), (violation,) = found.values, found.violations
-        if self._improves(violation, cost, self._place) or self._best is None:
-            return
-        self._place = self._best[2].copy()
-        self._length *= 0.5
-        self._forget()
+        if not self._improves(violation, cost, self._place) and self.best is not None:
+            self._place = self.best[1].copy()
+            self._length *= 0.5
+            self._forget()
 
     def _step(self, space: WashoutSpace, objective: Objective) -> Found:
         """J and its gradient on a few of the drives."""
@@ -90,9 +89,8 @@ class Descent(Method):
         return Found(objective.hours(drawn), (cost, *gradient.tolist()))
 
     def _move(self, values: tuple[float, ...]) -> None:
-        self._descend(np.array(values[1:]))
-
-    def _descend(self, gradient: Floats) -> None:
+        """One step of Adam."""
+        gradient = np.array(values[1:])
         self._since += 1
         self._mean += (1.0 - _DECAY[0]) * (gradient - self._mean)
         self._square += (1.0 - _DECAY[1]) * (gradient**2 - self._square)
