@@ -117,11 +117,22 @@ def begin_at_rest(actor: Actor, batch: Batch) -> None:
 
     So a training begins with a machine that stays in its travel, and moves at all: every gradient is useful.
     """
-    hidden = actor.latent.size - batch.layout.frame
+    begin_as(actor, _springs(batch.layout, batch.scale), _QUIET)
+
+
+def begin_as(actor: Actor, gains: NDArray[np.float32], quiet: float) -> None:
+    """Make an actor linear in the observation.
+
+    Args:
+        actor: The network.
+        gains: (action_size, size) of its last layer on the observation.
+        quiet: Standard deviation of its weights on the hidden layer.
+    """
+    hidden = actor.latent.size - gains.shape[1]
     with torch.no_grad():
         weight = torch.zeros_like(actor.head.weight)
-        weight[:, :hidden] = _QUIET * torch.randn(weight.shape[0], hidden)
-        weight[:, hidden:] = torch.from_numpy(_springs(batch.layout, batch.scale))
+        weight[:, :hidden] = quiet * torch.randn(weight.shape[0], hidden)
+        weight[:, hidden:] = torch.from_numpy(gains)
         actor.head.weight.copy_(weight)
         actor.head.bias.zero_()
 

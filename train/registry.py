@@ -64,6 +64,12 @@ for _algorithm in (
         "imitation of a controller, with dataset aggregation",
         ("torch",),
     ),
+    Algorithm(
+        "linear",
+        "motion_cueing.train.linear_learner",
+        "the best linear washout, by evolution: a beginning for apg",
+        ("torch",),
+    ),
 ):
     register(_algorithm)
 

@@ -1,0 +1,194 @@
+"""A washout that is linear in the observation: what the network of an agent can begin as.
+
+In the cab's frame, with the errors of specific force f and angular velocity omega, the low-passes f_j of the
+car's specific force (the observation's memory), and the acceleration a of the action before:
+
+    carriage   a <- (1 - leak) a + force_gain (f_car - f)
+                    + (leak + force_gain) (sum_j c_j f_j - 2 D w xdot - w^2 x)
+    heave      a <- (1 - leak) a + heave_gain (f_car - f) - (leak + heave_gain) (2 w_0 zdot + w_0^2 z)
+    pitch      a <- rate_gain (omega_car - omega) + stiffness ((t_0 f_car + sum_j t_j f_j) / g - theta)
+    roll       the same with -f_y
+    turntable  a <- yaw_gain (omega_car - omega)
+
+The rest is led back to neutral by w_0, critically damped. It high-passes what the carriage can follow and
+tilts for what lasts, as any washout, and corrects itself by what is felt.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..envs.cues import GRAVITY
+from ..envs.errors import ConfigurationError
+from ..envs.observation import SCALES
+from ..envs.platform.state import AXES
+from ..envs.settings import Positive, configuration
+from ..envs.task.layout import Layout
+
+Floats = NDArray[np.float64]
+
+CARRIAGE, HEXAPOD, HEAVE, TILT, YAW, TURNTABLE = (0, 1), (2, 3, 4), 4, (5, 6), 7, 8
+"""Axes in the order of ``AXES``."""
+
+_POSITIVE: Final = (
+    "carriage_frequency",
+    "carriage_damping",
+    "leak",
+    "force_gain",
+    "heave_gain",
+    "rate_gain",
+    "stiffness",
+    "yaw_gain",
+    "neutral_frequency",
+)
+_CUES: Final = 6
+"""Entries of the memory a time constant: specific force, angular velocity."""
+
+
+@configuration
+class LinearWashout:
+    """The gains. Defaults are for an action of 20 ms, and where a search begins.
+
+    Args:
+        carriage_frequency: w of the carriage's way back, rad/s.
+        carriage_damping: D of it.
+        leak: Share of the last acceleration of carriage and heave that is given up at each action.
+        force_gain: Share of the horizontal force's error that is made up for at each action.
+        heave_gain: The same of the vertical one's.
+        rate_gain: From the error of roll and pitch rate to tilt acceleration, 1/s.
+        stiffness: From the error of the tilt angle to tilt acceleration, 1/s^2.
+        yaw_gain: From the error of the yaw rate to the turntable's acceleration, 1/s.
+        neutral_frequency: w_0 of what is led back to neutral, rad/s.
+        carriage_shares: c_j, one for each time constant of the memory.
+        tilt_share: t_0.
+        tilt_shares: t_j.
+    """
+
+    carriage_frequency: Positive = 0.8
+    carriage_damping: Positive = 1.0
+    leak: Positive = 0.1
+    force_gain: Positive = 0.2
+    heave_gain: Positive = 0.1
+    rate_gain: Positive = 15.0
+    stiffness: Positive = 5.0
+    yaw_gain: Positive = 15.0
+    neutral_frequency: Positive = 1.0
+    carriage_shares: tuple[float, ...] = ()
+    tilt_share: float = 0.0
+    tilt_shares: tuple[float, ...] = ()
+
+
+def coordinates(washout: LinearWashout, memories: int) -> Floats:
+    """The gains as coordinates of a search: logarithms of the positive ones, then the shares.
+
+    Args:
+        washout: The gains; shares that are not given are 0.
+        memories: Time constants of the memory.
+
+    Raises:
+        ConfigurationError: there are more shares than time constants.
+    """
+    shares = []
+    for name in ("carriage_shares", "tilt_shares"):
+        given = getattr(washout, name)
+        if len(given) > memories:
+            raise ConfigurationError(
+                f"{name} has {len(given)} entries, but the observation's memory {memories} time constants"
+            )
+        shares.append([*given, *[0.0] * (memories - len(given))])
+    logarithms = [np.log(getattr(washout, name)) for name in _POSITIVE]
+    return np.array([*logarithms, washout.tilt_share, *shares[0], *shares[1]])
+
+
+def washout_at(point: Floats) -> LinearWashout:
+    """The gains at coordinates."""
+    n = len(_POSITIVE)
+    values = dict(zip(_POSITIVE, np.exp(point[:n]).tolist(), strict=True))
+    carriage, tilt = np.split(point[n + 1 :], 2)
+    return LinearWashout(
+        **values,
+        tilt_share=float(point[n]),
+        carriage_shares=tuple(carriage.tolist()),
+        tilt_shares=tuple(tilt.tolist()),
+    )
+
+
+def gains(washout: LinearWashout, layout: Layout, scale: Floats) -> Floats:
+    """(9, frame) from an observation to an action before its squashing; 0 for axes that do not move.
+
+    Args:
+        washout: The gains.
+        layout: Of the observation, in the cab's frame.
+        scale: (9,) accelerations that an action of 1 stands for, m/s^2 and rad/s^2.
+    """
+    return _Writer(layout, scale).written(washout)
+
+
+class _Writer:
+    """Puts gains in SI units where they belong."""
+
+    def __init__(self, layout: Layout, scale: Floats) -> None:
+        self._layout, self._scale = layout, scale
+        self._rows = {row.name: row for row in layout.rows}
+        self._gains = np.zeros((len(AXES), layout.frame))
+
+    def written(self, washout: LinearWashout) -> Floats:
+        """The matrix."""
+        self._carriage(washout)
+        self._hexapod(washout)
+        self._tilt(washout)
+        self._add(TURNTABLE, "rate_error", 2, washout.yaw_gain)
+        moving = self._scale > 0.0
+        self._gains[moving] /= self._scale[moving, None]
+        self._gains[~moving] = 0.0
+        return self._gains
+
+    def _add(self, axis: int, row: str, entry: int, gain: float) -> None:
+        """A gain from SI units to SI units."""
+        self._gains[axis, self._layout.first(row) + entry] += gain * self._rows[row].scale
+
+    def _keep(self, axis: int, share: float) -> None:
+        """A share of the last acceleration."""
+        self._gains[axis, self._layout.first("last_action") + axis] += share * self._scale[axis]
+
+    def _remember(self, axis: int, force: int, shares: tuple[float, ...], gain: float) -> None:
+        """Low-passed specific force."""
+        for j, share in enumerate(shares):
+            entry = self._layout.first("memory") + _CUES * j + force
+            self._gains[axis, entry] += gain * share * SCALES["wanted_force"]
+
+    def _carriage(self, w: LinearWashout) -> None:
+        lead = w.leak + w.force_gain
+        for k, axis in enumerate(CARRIAGE):
+            self._keep(axis, 1.0 - w.leak)
+            self._add(axis, "force_error", k, w.force_gain)
+            self._spring(axis, "carriage", "carriage_rate", k, w.carriage_frequency, w.carriage_damping, lead)
+            self._remember(axis, k, w.carriage_shares, lead)
+
+    def _hexapod(self, w: LinearWashout) -> None:
+        lead = w.leak + w.heave_gain
+        self._keep(HEAVE, 1.0 - w.leak)
+        self._add(HEAVE, "force_error", 2, w.heave_gain)
+        for k, axis in enumerate(HEXAPOD):
+            strength = lead if axis == HEAVE else 1.0
+            self._spring(axis, "displacement", "velocity", k, w.neutral_frequency, 1.0, strength)
+        self._spring(YAW, "beta", "beta_rate", 2, w.neutral_frequency, 1.0, 1.0)
+
+    def _tilt(self, w: LinearWashout) -> None:
+        for k, axis in enumerate(TILT):
+            # Roll answers to -f_y, pitch to f_x.
+            force, per_force = (1, -w.stiffness / GRAVITY) if k == 0 else (0, w.stiffness / GRAVITY)
+            self._add(axis, "rate_error", k, w.rate_gain)
+            self._add(axis, "beta", k, -w.stiffness)
+            self._add(axis, "wanted_force", force, per_force * w.tilt_share)
+            self._remember(axis, force, w.tilt_shares, per_force)
+
+    def _spring(
+        self, axis: int, position: str, rate: str, k: int, frequency: float, damping: float, strength: float
+    ) -> None:
+        """The way back to neutral."""
+        self._add(axis, position, k, -(frequency**2) * strength)
+        self._add(axis, rate, k, -2.0 * damping * frequency * strength)
