@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
-from rich.console import Console
 from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.cues import CueTrace
@@ -27,16 +25,13 @@ from .selection import ALL, find_car, find_maneuvers, find_platform, find_polici
 from .suite import CueSource, Drive, Outcome, run_suite
 from .suite_progress import suite_progress
 from .tables import print_results
-from .text_table import print_table
+from .text_table import print_table, table_console
 from .trajectory import Trajectory
 from .words import words_of
 
 if TYPE_CHECKING:
     from ..envs.car import Car
     from ..envs.platform import Platform
-
-_PLAIN_WIDTH: Final = 180
-"""Columns of the tables where the output is no terminal."""
 
 Name = Annotated[str, arg(metavar="NAME|FILE")]
 Names = Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
@@ -121,7 +116,7 @@ def run(command: EvaluateCommand) -> int:
     plan = make_plan(command)
     results, figures = evaluate(plan)
     save(results, figures, plan.out)
-    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
+    console = table_console()
     print_results(console, results)
     if ALL_RUNGS in command.policy and results.standings:
         print_table(console, ladder_table(results))

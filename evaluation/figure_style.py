@@ -17,6 +17,10 @@ from .verdict import STILL
 
 CAR: Final = "#1a1a1a"
 LIMIT: Final = "#a61e1e"
+FLOOR: Final = 0.01
+"""Least J on a logarithmic axis: what lies below is perfect to anyone, and is marked there."""
+LOWEST_SHARE: Final = -1.0
+"""Least share of the gap that is drawn; what lies below is marked there."""
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _DASHES: Final = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 _STILL_STYLE: Final = {"color": "#8a8a8a", "linestyle": (0, (2, 2)), "linewidth": 1.0}

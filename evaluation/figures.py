@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
 
 from ..envs.platform import ACTUATORS
 from .criteria import Criteria
@@ -26,6 +27,10 @@ _CUES = (
 _LEGS = slice(2, 8)
 _LINE = 0.075
 """Height of a number beside the panels, as a share of a panel's."""
+_MOST = 8
+"""Policies that a figure shows; lines of more cannot be told apart."""
+_NAMES_A_LINE = 12
+"""Names of policies in a line of the caption."""
 
 Drives = Mapping[str, Trajectory]
 Styles = Mapping[str, Mapping[str, Any]]
@@ -36,13 +41,19 @@ def maneuver_figure(
 ) -> bytes:
     """A PNG that shows the trajectories of one maneuver.
 
+    Of more than eight policies it shows the references of the share and the best; its caption names the rest.
+
     Args:
         drives: Trajectory of each policy (at least one), all of the same cues.
-        policies: All policies of the evaluation, so that each keeps its colour from figure to figure.
+        policies: All policies of the evaluation, so that each keeps its colour from figure to figure, as far
+            as all are shown.
         criteria: Thresholds to draw.
     """
     criteria = criteria or Criteria()
-    styles = line_styles(policies or list(drives))
+    shown = shown_policies(drives, criteria)
+    others = [name for name in drives if name not in shown]
+    styles = line_styles(shown if others else policies or list(drives))
+    drives = {name: drives[name] for name in shown}
     with styled():
         figure = new_figure(13.0, 14.0)
         grid = figure.subplots(5, 3, sharex=True)
@@ -59,8 +70,32 @@ def maneuver_figure(
         title = f"{first.maneuver} (car {first.car}, motion base {first.platform})"
         figure.suptitle(title, fontsize=13, x=0.01, ha="left")
         handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 7), fontsize=9)
+        columns = min(len(labels), 7)
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
+        if others:
+            legend.set_title(_caption(others), FontProperties(size=8.5))
         return png(figure)
+
+
+def shown_policies(drives: Drives, criteria: Criteria) -> list[str]:
+    """The policies a figure shows: all, or of more than eight the references and the best by J."""
+    if len(drives) <= _MOST:
+        return list(drives)
+    errors = {name: float(np.mean(cue_error(*cab_motion(drive), criteria))) for name, drive in drives.items()}
+    references = [
+        name for name in (criteria.references.baseline, criteria.references.optimum) if name in drives
+    ]
+    best = [name for name in sorted(errors, key=errors.__getitem__) if name not in references]
+    chosen = {*references, *best[: _MOST - len(references)]}
+    return [*references, *(name for name in best if name in chosen)]
+
+
+def _caption(others: list[str]) -> str:
+    """Names the policies that are not shown."""
+    lines = [", ".join(others[i : i + _NAMES_A_LINE]) for i in range(0, len(others), _NAMES_A_LINE)]
+    return "Shown: the references and the best. Numbers of the others are in the tables:\n" + ",\n".join(
+        lines
+    )
 
 
 def _label(axes: Axes, title: str, unit: str) -> None:
@@ -151,10 +186,15 @@ def _limit_activity(axes: Axes, drives: Drives, styles: Styles) -> None:
 
 
 def _spread(heights: list[float], least: float) -> list[float]:
-    """Heights moved up as far as they must be to lie apart, in the same order."""
+    """Heights from 0 to 1, moved as far as they must be to lie apart, in the same order, and none above 1."""
     moved: dict[int, float] = {}
-    for i in sorted(range(len(heights)), key=heights.__getitem__):
+    order = sorted(range(len(heights)), key=heights.__getitem__)
+    for i in order:
         moved[i] = max(heights[i], max(moved.values(), default=-1.0) + least)
+    ceiling = 1.0
+    for i in reversed(order):
+        moved[i] = min(moved[i], ceiling)
+        ceiling = moved[i] - least
     return [moved[i] for i in range(len(heights))]
 
 
@@ -175,5 +215,5 @@ def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> No
         text = f"{end:.2f}" if share is None else f"{end:.2f} ({share:.2f})"
         style = {"color": styles[name]["color"], "fontsize": 8, "va": "center"}
         axes.annotate(text, (1.01, height), xycoords="axes fraction", annotation_clip=False, **style)
-    shares = "J" if baseline is None or optimum is None else "J, share of the gap in brackets"
-    _label(axes, f"Cue error up to now, to {shares}", "J")
+    shares = "" if baseline is None or optimum is None else " (share of the gap)"
+    _label(axes, f"Cue error so far, to J{shares}", "J")

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from rich.console import Console
+from rich.markup import escape
 from tyro.conf import FlagCreatePairsOff, arg
 
-from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.errors import ConfigurationError, DataError, MotionCueingError, look_up
 from ..envs.storage import write_bytes
 from .frequency_probe import OMCT_FREQUENCIES, FrequencyTest
+from .frequency_tables import response_table, save_csv, save_json
+from .ladder import ALL_RUNGS
 from .metrics import CUE_AXES
 from .selection import find_platform, find_policies
+from .suite import explain
 from .suite_progress import suite_progress
-from .text_table import print_table
+from .text_table import print_table, table_console
 from .words import words_of
 
 if TYPE_CHECKING:
+    from ..envs.platform import Platform
     from .frequency_response import FrequencyResponse
-
-_PLAIN_WIDTH: Final = 180
-"""Columns of the tables where the output is no terminal."""
+    from .rollout import AnyPolicy
 
 _SMALL: Final = 1e-6
 """Scale below which amplitudes drown in rounding."""
@@ -39,7 +40,7 @@ class FrequencyResponseCommand:
     """
 
     policy: Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
-    """Policies, by name or file."""
+    """Policies, by name or file; `ladder` for all controllers that can be tested."""
     platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
     """Motion base, by name or YAML file."""
     out: Annotated[Path, arg(metavar="DIR")] = Path("frequency-response")
@@ -56,53 +57,109 @@ class FrequencyResponseCommand:
     """Let roll and pitch bring the specific force of a tilted car with them; else rotations are pure."""
 
 
+@dataclass(eq=False)
+class Measured:
+    """What a command gave.
+
+    Args:
+        responses: One a policy.
+        left_out: Policies of the ladder that cannot be tested here, and why.
+        failed: Policies whose test came to no end, and why.
+    """
+
+    responses: list[FrequencyResponse] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
+
+
 def run(command: FrequencyResponseCommand) -> int:
-    """Measure, print and write.
+    """Measure, print and write; the exit status is 1 if a policy's test failed.
 
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    from .frequency_figure import bode_figure, matrix_figure
-    from .frequency_tables import response_table, save_csv, save_json
+    measured = measure_all(command)
+    console = table_console()
+    if measured.responses:
+        _save(measured.responses, command)
+    for response in measured.responses:
+        print_table(console, response_table(response))
+    for policy, reason in measured.left_out.items():
+        console.print(f"[bold]left out[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
+    for policy, reason in measured.failed.items():
+        console.print(f"[bold red]failed[/bold red] {escape(policy)}: {escape(reason)}", highlight=False)
+    if measured.responses:
+        told = f"Every axis to every axis is in {command.out}: bode.png, matrix.png, frequency-response.csv"
+        console.print(told, highlight=False, markup=False)
+    return 1 if measured.failed else 0
 
-    responses = measure_all(command)
-    arguments = words_of("frequency-response", command)
-    save_json(responses, arguments, command.out / "frequency-response.json")
+
+def _save(responses: list[FrequencyResponse], command: FrequencyResponseCommand) -> None:
+    from .frequency_figure import bode_figure, matrix_figure
+
+    save_json(responses, words_of("frequency-response", command), command.out / "frequency-response.json")
     save_csv(responses, command.out / "frequency-response.csv")
     write_bytes(command.out / "bode.png", bode_figure(responses))
     write_bytes(command.out / "matrix.png", matrix_figure(responses))
-    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
-    for response in responses:
-        print_table(console, response_table(response))
-    console.print(
-        f"Every axis to every axis is in {command.out}: bode.png, matrix.png, frequency-response.csv",
-        highlight=False,
-        markup=False,
-    )
-    return 0
 
 
-def measure_all(command: FrequencyResponseCommand) -> list[FrequencyResponse]:
+def measure_all(command: FrequencyResponseCommand) -> Measured:
     """The response of each policy, once all arguments are checked.
 
     Raises:
-        MotionCueingError: an argument is wrong.
+        MotionCueingError: an argument is wrong, or a policy that is asked for by its name cannot be tested.
     """
     from .frequency_response import frequency_response
-    from .policies import make_policy
 
     test, axes = _test(command), _axes(command)
     if command.out.exists() and not command.out.is_dir():
         raise DataError(f"--out {command.out} is a file; name a folder")
     platform = find_platform(command.platform)
-    names = find_policies(command.policy, platform)
-    policies = {label: make_policy(name, platform) for label, name in names.items()}
-    found = []
+    policies, left_out = _line_up(command, platform)
+    found = Measured(left_out=left_out)
     with suite_progress(len(policies) * len(test.frequencies)) as advance:
         for label, policy in policies.items():
-            response = frequency_response(policy, platform, test, axes, _telling(advance, label))
-            found.append(replace(response, policy=label))
+            # A policy is a user's code: whatever it raises must not cost what was measured before.
+            try:
+                response = frequency_response(policy, platform, test, axes, _telling(advance, label))
+            except Exception as error:
+                found.failed[label] = explain(error)
+            else:
+                found.responses.append(replace(response, policy=label))
     return found
+
+
+def _line_up(
+    command: FrequencyResponseCommand, platform: Platform
+) -> tuple[dict[str, AnyPolicy], dict[str, str]]:
+    """Policies by label, and the reasons of those of the ladder that are left out.
+
+    Raises:
+        MotionCueingError: a policy that is asked for by its name cannot be made or tested.
+    """
+    policies: dict[str, AnyPolicy] = {}
+    left_out: dict[str, str] = {}
+    for label, name in find_policies(command.policy, platform).items():
+        try:
+            policies[label] = _testable(name, platform)
+        except MotionCueingError as error:
+            if ALL_RUNGS not in command.policy or name in command.policy:
+                raise
+            left_out[label] = str(error)
+    return policies, left_out
+
+
+def _testable(name: str, platform: Platform) -> AnyPolicy:
+    from ..baselines.ceiling import CeilingWashout
+    from .policies import make_policy
+
+    policy = make_policy(name, platform)
+    if isinstance(policy, CeilingWashout):
+        raise ConfigurationError(
+            f"{name} has a set for each standard maneuver and none for sinusoids, so it has no frequency "
+            "response; use classical-tuned, or the .yaml file of one set"
+        )
+    return policy
 
 
 def _test(command: FrequencyResponseCommand) -> FrequencyTest:

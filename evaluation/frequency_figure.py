@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from .criteria import Criteria
 from .figure_style import CAR, line_styles, new_figure, png, styled
 from .frequency_response import FrequencyResponse
+from .frequency_tables import amplitudes
 from .metrics import CUE_AXES
 
 _TITLES: Final = {
@@ -23,6 +25,9 @@ _TITLES: Final = {
     "w_y": "Pitch rate",
     "w_z": "Yaw rate",
 }
+_ABOUT_MATRIX: Final = (
+    "modulus in indifference zones (0.6 m/s², 3 deg/s) per zone; off the diagonal all is false"
+)
 _LEAST: Final = 1e-3
 """Smallest modulus shown."""
 
@@ -39,44 +44,80 @@ def bode_figure(responses: Sequence[FrequencyResponse]) -> bytes:
             row, column = 2 * (i // 3), i % 3
             _modulus(grid[row, column], responses, styles, axis, axis, 1.0)
             _phase(grid[row + 1, column], responses, styles, axis)
+            if axis not in _inputs(responses):
+                _not_measured(grid[row, column])
+                _not_measured(grid[row + 1, column])
             grid[row, column].set_title(_TITLES[axis])
             grid[row, column].set_ylim(0.01, 4.0)
         for axes in grid[-1]:
             axes.set_xlabel("frequency (rad/s)")
         for k in range(4):
             grid[k, 0].set_ylabel("phase (deg)" if k % 2 else "modulus")
-        _finish(figure, grid[0, 0], responses, "Frequency response, each axis to itself")
+        felt = {r.policy for r in responses for axis in r.inputs if np.any(r.response(axis, axis))}
+        _finish(figure, responses, "Frequency response, each axis to itself", felt)
         return png(figure)
 
 
 def matrix_figure(responses: Sequence[FrequencyResponse], criteria: Criteria | None = None) -> bytes:
-    """A PNG of the modulus of each axis (rows) to each input (columns), in indifference zones."""
+    """A PNG of the modulus of each axis (rows) to each input (columns), in indifference zones.
+
+    Inputs that were not measured have no column.
+    """
     scales = dict(zip(CUE_AXES, (criteria or Criteria()).scales, strict=True))
+    inputs = _inputs(responses)
     with styled():
-        figure = new_figure(13.0, 11.0)
-        grid = figure.subplots(6, 6, sharex=True, sharey=True)
+        figure = new_figure(max(9.0, 2.8 + 1.7 * len(inputs)), 11.0)
+        grid = figure.subplots(len(CUE_AXES), len(inputs), sharex=True, sharey=True, squeeze=False)
         styles = _styles(responses)
-        for i, felt in enumerate(CUE_AXES):
-            for j, moved in enumerate(CUE_AXES):
+        for j, moved in enumerate(inputs):
+            for i, felt in enumerate(CUE_AXES):
                 _modulus(grid[i, j], responses, styles, moved, felt, scales[moved] / scales[felt])
                 if felt == moved:
                     grid[i, j].set_facecolor("#f3f6f9")
-            grid[i, 0].set_ylabel(f"felt {felt}")
-            grid[0, i].set_title(f"car's {CUE_AXES[i]}")
-            grid[-1, i].set_xlabel("rad/s")
-        note = "modulus in indifference zones (0.6 m/s², 3 deg/s) per zone; off the diagonal all is false"
-        _finish(figure, grid[0, 0], responses, f"Every axis to every input: {note}")
+                grid[i, 0].set_ylabel(f"felt {felt}")
+            grid[0, j].set_title(f"car's {moved}")
+            grid[-1, j].set_xlabel("rad/s")
+        felt_at_all = {
+            r.policy for r in responses for j in r.inputs for i in CUE_AXES if np.any(r.response(j, i))
+        }
+        _finish(figure, responses, "Every axis to every input", felt_at_all, _ABOUT_MATRIX)
         return png(figure)
+
+
+def _inputs(responses: Sequence[FrequencyResponse]) -> list[str]:
+    """Axes that were moved."""
+    return [axis for axis in CUE_AXES if any(axis in response.inputs for response in responses)]
+
+
+def _not_measured(axes: Axes) -> None:
+    axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center", color="#8a8a8a")
+    axes.set_facecolor("#f5f5f5")
 
 
 def _styles(responses: Sequence[FrequencyResponse]) -> Styles:
     return line_styles([response.policy for response in responses])
 
 
-def _finish(figure: Any, first: Axes, responses: Sequence[FrequencyResponse], title: str) -> None:
-    about = f"motion base {responses[0].platform}, {responses[0].test.scale:g} × the test's amplitudes"
-    figure.suptitle(f"{title} ({about})", fontsize=11, x=0.01, ha="left")
-    figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=9)
+def _finish(
+    figure: Any, responses: Sequence[FrequencyResponse], title: str, felt: Collection[str], more: str = ""
+) -> None:
+    """Title and legend.
+
+    Args:
+        figure: With the panels.
+        responses: That are drawn.
+        title: Of the figure.
+        felt: Policies that have a line somewhere; of the others the legend says why they have none.
+        more: Second line of the title.
+    """
+    about = f"motion base {responses[0].platform}, {amplitudes(responses[0].test.scale)}"
+    figure.suptitle(f"{title} ({about})\n{more}".strip(), fontsize=11, x=0.01, ha="left")
+    styles = _styles(responses)
+    nothing = {"linestyle": ""}
+    handles = [Line2D([], [], **(style if policy in felt else nothing)) for policy, style in styles.items()]
+    labels = [policy if policy in felt else f"{policy}: nothing comes through" for policy in styles]
+    columns = max(1, min(len(labels), int(figure.get_figwidth() / 2)))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
 
 
 def _modulus(
@@ -90,15 +131,11 @@ def _modulus(
     if moved == felt:
         axes.axhline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     for response in responses:
-        values = np.maximum(scale * np.abs(response.response(moved, felt)), 0.5 * _LEAST)
-        axes.plot(
-            response.frequencies(moved),
-            values,
-            marker="o",
-            markersize=2.5,
-            label=response.policy,
-            **styles[response.policy],
-        )
+        modulus = scale * np.abs(response.response(moved, felt))
+        # Lines that leave the panel are seen to; where nothing comes through there is no line.
+        values = np.where(modulus > 0.0, np.maximum(modulus, 0.5 * _LEAST), np.nan)
+        line = {"marker": "o", "markersize": 2.5, **styles[response.policy]}
+        axes.plot(response.frequencies(moved), values, **line)
     _frequencies(axes)
     axes.set_yscale("log")
     _decades(axes.yaxis, (0.001, 0.01, 0.1, 1.0, 10.0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from .trajectory import Floats
 
 Complexes = NDArray[np.complex128]
 
+SILENCE: Final = 1e-6
+"""Modulus, in SI units, below which nothing comes through: what is left is rounding, which has no phase."""
+
 
 @configuration
 class Sinusoid:
@@ -36,7 +39,8 @@ class Sinusoid:
         frequency: rad/s.
         amplitude: Of the input, m/s^2 or rad/s.
         modulus: By axis: amplitude of what is felt over ``amplitude``.
-        phase: By axis: of what is felt before what is wanted on ``input``, rad, within (-pi, pi].
+        phase: By axis: of what is felt before what is wanted on ``input``, rad, within (-pi, pi]; None where
+            the modulus is below :data:`SILENCE`.
         explained: Share of the variance felt on the input's own axis that is this sinusoid; 1 if the policy
             is linear, 0 where nothing is felt.
         at_limit: Share of the measured time with any actuator at any limit.
@@ -46,7 +50,7 @@ class Sinusoid:
     frequency: float
     amplitude: float
     modulus: dict[str, float]
-    phase: dict[str, float]
+    phase: dict[str, float | None]
     explained: float
     at_limit: float
 
@@ -77,9 +81,10 @@ class FrequencyResponse:
         return np.array([s.frequency for s in self.sinusoids if s.input == moved])
 
     def response(self, moved: str, felt: str) -> Complexes:
-        """(n,) complex response of an axis to an input axis, by :meth:`frequencies`."""
-        chosen = [s for s in self.sinusoids if s.input == moved]
-        return np.array([s.modulus[felt] * np.exp(1j * s.phase[felt]) for s in chosen])
+        """(n,) complex response of an axis to an input axis, by :meth:`frequencies`; 0 in silence."""
+        chosen = [(s.modulus[felt], s.phase[felt]) for s in self.sinusoids if s.input == moved]
+        found = [0.0 if phase is None else modulus * np.exp(1j * phase) for modulus, phase in chosen]
+        return np.array(found, dtype=np.complex128)
 
 
 def frequency_response(
@@ -125,12 +130,14 @@ def _sinusoid(one: Probe, motion: _Motion, amplitude: float) -> Sinusoid:
     wanted, _ = harmonic(motion.wanted, one.frequency, motion.dt)
     felt, explained = harmonic(motion.felt, one.frequency, motion.dt)
     ratio = felt / wanted[column]
+    modulus, phase = np.abs(ratio), np.angle(ratio).tolist()
+    phases = [angle if size >= SILENCE else None for size, angle in zip(modulus, phase, strict=True)]
     return Sinusoid(
         input=one.axis,
         frequency=one.frequency,
         amplitude=amplitude,
-        modulus=dict(zip(CUE_AXES, np.abs(ratio).tolist(), strict=True)),
-        phase=dict(zip(CUE_AXES, np.angle(ratio).tolist(), strict=True)),
+        modulus=dict(zip(CUE_AXES, modulus.tolist(), strict=True)),
+        phase=dict(zip(CUE_AXES, phases, strict=True)),
         explained=float(explained[column]),
         at_limit=float(motion.limited.mean()),
     )

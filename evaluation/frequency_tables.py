@@ -14,7 +14,7 @@ from . import saved
 from .frequency_response import FrequencyResponse
 from .provenance import versions
 from .spreadsheet import save_rows
-from .text_table import TextTable, number
+from .text_table import NOTHING, TextTable, number
 
 SCHEMA: Final = 1
 """Version of ``frequency-response.json``."""
@@ -24,7 +24,10 @@ CROSSED: Final = (("f_x", "w_y"), ("f_y", "w_x"), ("w_y", "f_x"), ("w_x", "f_y")
 
 
 def response_table(response: FrequencyResponse) -> TextTable:
-    """Modulus and phase of each axis to itself and of the crossed responses, over frequency."""
+    """Modulus and phase of each axis to itself and of the crossed responses, over frequency.
+
+    In silence the modulus is 0 and there is no phase.
+    """
     pairs = [(axis, axis) for axis in response.inputs]
     pairs += [pair for pair in CROSSED if pair[0] in response.inputs]
     rows: list[tuple[str, ...]] = []
@@ -32,12 +35,19 @@ def response_table(response: FrequencyResponse) -> TextTable:
         values = response.response(moved, felt)
         name = moved if moved == felt else f"{moved} to {felt}"
         modulus = np.abs(values) * factor(moved, felt)
-        rows.append((f"{name}, modulus{unit(moved, felt)}", *(number(value) for value in modulus)))
-        phases = np.degrees(np.angle(values))
-        rows.append((f"{name}, phase deg", *(f"{phase:.0f}" for phase in phases)))
+        rows.append(
+            (f"{name}, modulus{unit(moved, felt)}", *(number(value) if value else "0" for value in modulus))
+        )
+        phases = (f"{np.degrees(np.angle(value)):.0f}" if value else NOTHING for value in values)
+        rows.append((f"{name}, phase deg", *phases))
     header = ("rad/s", *(f"{frequency:.3g}" for frequency in response.test.frequencies))
-    title = f"{response.policy} on {response.platform}, {response.test.scale:g} of the test's amplitudes"
+    title = f"{response.policy} on {response.platform}, {amplitudes(response.test.scale)}"
     return TextTable(title, header, tuple(rows))
+
+
+def amplitudes(scale: float) -> str:
+    """How large the inputs are, for titles."""
+    return "the test's amplitudes" if scale == 1.0 else f"{scale:g} of the test's amplitudes"
 
 
 def factor(moved: str, felt: str) -> float:

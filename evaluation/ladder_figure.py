@@ -8,14 +8,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
-from .figure_style import CAR, new_figure, png, styled
+from .figure_style import CAR, FLOOR, LOWEST_SHARE, new_figure, png, styled
 from .ladder import Rung, rungs
 from .results import Results
+from .text_table import fraction, number
+from .words import how_many
 
 _COLOURS: Final = ("#0072b2", "#e69f00")
 _NAMES: Final = ("J (at the cab)", "perceived J")
-_LOWEST_SHARE: Final = -1.0
-"""Bars that reach further down end here, with their value beside them."""
 _HALF: Final = 0.19
 """Half the distance of a policy's two bars."""
 
@@ -39,7 +39,7 @@ def ladder_figure(results: Results) -> bytes | None:
         panels[0].invert_yaxis()
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
-        title = f"The ladder of controllers, means over {found[0].standing.maneuvers} drives"
+        title = f"The ladder of controllers, means over {how_many(found[0].standing.maneuvers, 'drive')}"
         where = f"car {results.provenance.car}, motion base {results.provenance.platform}"
         figure.suptitle(f"{title} ({where})", fontsize=11, x=0.01, ha="left")
         return png(figure)
@@ -47,14 +47,15 @@ def ladder_figure(results: Results) -> bytes | None:
 
 def _errors(axes: Axes, found: list[Rung]) -> None:
     values = [[r.standing.cue_error for r in found], [r.standing.perceived_cue_error for r in found]]
-    least = min((v for row in values for v in row if v > 0.0), default=1.0)
+    least = max(FLOOR, min((v for row in values for v in row if v > 0.0), default=1.0))
     for i, row in enumerate(values):
         _bars(axes, i, [max(v, least) for v in row])
         for k, value in enumerate(row):
-            _tell(axes, max(value, least), k, i, f"{value:.2f}" if value < 100.0 else f"{value:.0f}")
+            cut = "◂ " if value < least else ""
+            _tell(axes, max(value, least), k, i, f"{cut}{number(value)}")
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_xlim(0.6 * least, 2.2 * max(max(row) for row in values))
+    axes.set_xlim(0.6 * least, 2.5 * max(least, *(max(row) for row in values)))
     axes.set_title("Mean J (logarithmic; below 1 within what a driver minds)")
     axes.axvline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     axes.grid(axis="y", visible=False)
@@ -62,12 +63,12 @@ def _errors(axes: Axes, found: list[Rung]) -> None:
 
 def _shares(axes: Axes, found: list[Rung]) -> None:
     for i, row in enumerate([[r.standing.share for r in found], [r.standing.perceived_share for r in found]]):
-        _bars(axes, i, [0.0 if v is None else max(v, _LOWEST_SHARE) for v in row])
+        _bars(axes, i, [0.0 if v is None else max(v, LOWEST_SHARE) for v in row])
         for k, value in enumerate(row):
             if value is not None:
-                cut = "◂ " if value < _LOWEST_SHARE else ""
-                _tell(axes, max(value, _LOWEST_SHARE), k, i, f"{cut}{value:.2f}")
-    axes.set_xlim(_LOWEST_SHARE - 0.25, 1.25)
+                cut = "◂ " if value < LOWEST_SHARE else ""
+                _tell(axes, max(value, LOWEST_SHARE), k, i, f"{cut}{fraction(value)}")
+    axes.set_xlim(LOWEST_SHARE - 0.25, 1.25)
     axes.axvline(0.0, color=CAR, linewidth=0.8)
     axes.axvline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     axes.set_title("Share of the gap: 0 tuned washout, 1 optimum")

@@ -11,6 +11,7 @@ from .share import Share
 from .spreadsheet import save_rows
 from .tables import SHARE_HEADER, has_shares, share_cells
 from .text_table import NOTHING, TextTable, degrees, microseconds, number, percent, save_markdown
+from .words import how_many
 
 _BEFORE: Final = ("policy", "J", "perceived J")
 _AFTER: Final = (
@@ -34,7 +35,7 @@ def ladder_table(results: Results) -> TextTable:
     best = min(range(len(found)), key=lambda i: found[i].standing.cue_error) if found else None
     count = found[0].standing.maneuvers if found else 0
     return TextTable(
-        f"The ladder, means over {count} drives",
+        f"The ladder, means over {how_many(count, 'drive')}",
         (*_BEFORE, *(SHARE_HEADER if shown else ()), *_AFTER),
         tuple(rows),
         () if best is None else (best,),
@@ -60,6 +61,7 @@ def _row(rung: Rung, shares: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def save_ladder(results: Results, folder: Path) -> None:
-    """Write ``ladder.csv`` (SI units) and ``ladder.md`` (the table) into a folder."""
+    """Write ``ladder.csv`` (SI units) and ``ladder.md`` (the table, and what was left out) into a folder."""
     save_rows([numbers_of(rung) for rung in rungs(results)], folder / "ladder.csv")
-    save_markdown(ladder_table(results), folder / "ladder.md")
+    left_out = [f"Left out: {policy}: {reason}" for policy, reason in results.left_out.items()]
+    save_markdown(folder / "ladder.md", ladder_table(results), *left_out)

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from shlex import join
-from typing import Final
-
-from rich.console import Console
 
 from ..envs.errors import DataError
 from ..envs.storage import write_bytes
@@ -18,12 +14,9 @@ from .criteria import Criteria
 from .provenance import versions
 from .study import Condition, StudyOutcome, run_study
 from .study_results import SCHEMA, StudyResults, common_maneuvers, summarise
-from .study_tables import matrix_table, print_study
+from .study_tables import matrix_table, print_study, share_tables
 from .suite_progress import suite_progress
-from .text_table import save_markdown
-
-_PLAIN_WIDTH: Final = 180
-"""Columns of the tables where the output is no terminal."""
+from .text_table import save_markdown, table_console
 
 
 def check_folder(out: Path, fresh: bool) -> None:
@@ -67,11 +60,11 @@ def run_and_save(
     results = results_of(conditions, list(policies), outcome, words)
     results.save_json(out / "study.json")
     results.save_csv(out / "study.csv")
-    save_markdown(matrix_table(results, title, ratios), out / "study.md")
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results))
     image = figure(results)
     if image is not None:
         write_bytes(out / "study.png", image)
-    console = Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH)
+    console = table_console()
     print_study(console, results, title, ratios)
     console.print(
         f"{outcome.driven} of {count} drives driven now; everything is in {out}",

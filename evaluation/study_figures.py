@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -11,9 +12,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from .figure_style import CAR, line_styles, new_figure, png, styled
+from .figure_style import CAR, FLOOR, LOWEST_SHARE, line_styles, new_figure, png, styled
 from .study_results import StudyResults, Summary
 from .text_table import number
+from .words import how_many
 
 _WORST_RATIO: Final = 4.0
 """Ratio of J at which the darkest colour is reached."""
@@ -24,38 +26,71 @@ _BRIGHT: Final = 2.4
 
 
 def lines_figure(results: StudyResults) -> bytes | None:
-    """A PNG of J and perceived J of each policy over the conditions, or None where nothing was driven."""
+    """A PNG of J and perceived J of each policy over the conditions, or None where nothing was driven.
+
+    Panels of the share of the gap stand beside them where the references are among the policies.
+    """
     if not results.summaries:
         return None
+    found = [s for policies in results.summaries.values() for s in policies.values()]
+    shares = any(s.share is not None or s.perceived_share is not None for s in found)
+    columns = 2 if shares else 1
     with styled():
-        figure = new_figure(max(8.0, 1.5 * len(results.conditions) + 5.0), 8.5)
-        top, bottom = figure.subplots(2, 1, sharex=True)
-        _lines(top, results, False)
-        _lines(bottom, results, True)
-        top.set_title("J at the cab (logarithmic; below 1 within what a driver minds)")
-        bottom.set_title("Perceived J")
-        bottom.set_xticks(range(len(results.conditions)), list(results.conditions), rotation=20, ha="right")
-        figure.legend(*top.get_legend_handles_labels(), loc="outside right center", fontsize=9)
-        title = f"How much machine does a controller need? Mean over {len(results.maneuvers)} drives"
+        figure = new_figure(3.0 + columns * max(5.0, 1.1 * len(results.conditions) + 2.0), 8.5)
+        grid = figure.subplots(2, columns, sharex=True, squeeze=False)
+        for axes, perceived in zip(grid[:, 0], (False, True), strict=True):
+            _errors(axes, results, perceived)
+        for axes, perceived in zip(grid[:, 1] if shares else (), (False, True), strict=False):
+            _shares(axes, results, perceived)
+        names = list(results.conditions)
+        for axes in grid[-1]:
+            axes.set_xlim(-0.3, len(names) - 0.7)
+            axes.set_xticks(range(len(names)), names, rotation=20, ha="right")
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside right center", fontsize=9)
+        mean = f"Mean over {how_many(len(results.maneuvers), 'drive')}"
+        title = f"How much machine does a controller need? {mean}"
         figure.suptitle(title, fontsize=12, x=0.01, ha="left")
         return png(figure)
 
 
-def _lines(axes: Axes, results: StudyResults, perceived: bool) -> None:
-    styles = line_styles(results.policies)
-    for policy in results.policies:
-        values = []
-        for condition in results.conditions:
-            found = results.summaries.get(condition, {}).get(policy)
-            values.append(
-                math.nan if found is None else found.perceived_cue_error if perceived else found.cue_error
-            )
-        axes.plot(range(len(values)), values, marker="o", markersize=4.5, label=policy, **styles[policy])
+def _errors(axes: Axes, results: StudyResults, perceived: bool) -> None:
+    _lines(axes, results, lambda s: s.perceived_cue_error if perceived else s.cue_error, FLOOR)
     axes.axhline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     axes.set_yscale("log")
+    axes.set_ylim(bottom=max(axes.get_ylim()[0], 0.8 * FLOOR))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlim(-0.3, len(results.conditions) - 0.7)
+    axes.set_title(
+        "Perceived J" if perceived else "J at the cab (logarithmic; below 1 within what a driver minds)"
+    )
+
+
+def _shares(axes: Axes, results: StudyResults, perceived: bool) -> None:
+    _lines(axes, results, lambda s: s.perceived_share if perceived else s.share, LOWEST_SHARE)
+    axes.axhline(0.0, color=CAR, linewidth=0.8)
+    axes.axhline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
+    axes.set_ylim(LOWEST_SHARE - 0.1, 1.25)
+    about = "Perceived share of the gap" if perceived else "Share of the gap"
+    axes.set_title(f"{about}: 0 tuned washout, 1 optimum")
+
+
+def _lines(axes: Axes, results: StudyResults, value: Callable[[Summary], float | None], floor: float) -> None:
+    """A line a policy; values below the floor lie on it, marked with a triangle that points down."""
+    styles = line_styles(results.policies)
+    below = False
+    for policy in results.policies:
+        found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
+        told = [None if summary is None else value(summary) for summary in found]
+        values = np.array([math.nan if v is None else v for v in told])
+        low = values < floor
+        shown = np.where(low, floor, values)
+        axes.plot(range(len(values)), shown, label=policy, **styles[policy])
+        colour = styles[policy]["color"]
+        for marker, chosen in (("o", ~low), ("v", low)):
+            axes.plot(np.flatnonzero(chosen), shown[chosen], marker, markersize=5.0, color=colour)
+        below = below or bool(low.any())
+    if below:
+        axes.set_title(f"▾ below {floor:g}", loc="right", fontsize=7.5, fontweight="normal", color="#5d6878")
 
 
 def heat_figure(results: StudyResults) -> bytes | None:
@@ -85,7 +120,8 @@ def heat_figure(results: StudyResults) -> bytes | None:
         bar = figure.colorbar(image, ax=axes, label=f"J over that of {names[0]}", pad=0.01)
         bar.set_ticks(_TICKS, labels=[f"{tick:g}" for tick in _TICKS])
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_title(f"J, J over {names[0]}, time at a limit; mean over {len(results.maneuvers)} drives")
+        drives = how_many(len(results.maneuvers), "drive")
+        axes.set_title(f"J, J over {names[0]}, time at a limit; mean over {drives}")
         return png(figure)
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from rich.console import Console
 from rich.markup import escape
 
+from .counted import print_troubles
 from .share import Share
 from .study_results import StudyResults, Summary
 from .tables import SHARE_HEADER, has_shares, share_cells
-from .text_table import NOTHING, TextTable, degrees, number, percent, print_table
+from .text_table import NOTHING, TextTable, degrees, fraction, number, percent, print_table
+from .words import how_many
 
 
 def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
@@ -23,7 +25,7 @@ def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
     for policy in results.policies:
         cells = [_cell(results, condition, policy, ratios) for condition in results.conditions]
         rows.append((policy, *cells))
-    about = f"{title}: J, mean over {len(results.maneuvers)} drives"
+    about = f"{title}: J, mean over {how_many(len(results.maneuvers), 'drive')}"
     return TextTable(about, ("policy", *results.conditions), tuple(rows))
 
 
@@ -35,6 +37,25 @@ def _cell(results: StudyResults, condition: str, policy: str, ratios: bool) -> s
     if not ratios or first or found.ratio is None:
         return number(found.cue_error)
     return f"{number(found.cue_error)} (×{found.ratio:.2f})"
+
+
+def share_tables(results: StudyResults) -> list[TextTable]:
+    """Share of the gap of every policy under every condition, of J and of the perceived J, if there is any.
+
+    A share is of the gap under its own condition.
+    """
+    kinds = (("Share of the gap", False), ("Perceived share of the gap", True))
+    made = [_share_table(results, title, perceived) for title, perceived in kinds]
+    return [table for table in made if any(set(row[1:]) != {NOTHING} for row in table.rows)]
+
+
+def _share_table(results: StudyResults, title: str, perceived: bool) -> TextTable:
+    rows = []
+    for policy in results.policies:
+        found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
+        shares = [None if s is None else s.perceived_share if perceived else s.share for s in found]
+        rows.append((policy, *(fraction(share) for share in shares)))
+    return TextTable(title, ("policy", *results.conditions), tuple(rows))
 
 
 def condition_table(results: StudyResults, condition: str) -> TextTable:
@@ -74,10 +95,18 @@ def _row(name: str, s: Summary, shares: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def print_study(console: Console, results: StudyResults, title: str, ratios: bool) -> None:
-    """Show a table a condition, the matrix of J, and what was left out or failed."""
+    """Show a table a condition, the matrices of J and shares, and what was counted, left out or failed."""
     for condition in results.conditions:
         print_table(console, condition_table(results, condition))
-    print_table(console, matrix_table(results, title, ratios))
+    for table in (matrix_table(results, title, ratios), *share_tables(results)):
+        print_table(console, table)
+    counted = [
+        (policy, f"{condition} {maneuver}", found)
+        for condition, policies in results.notes.items()
+        for policy, drives in policies.items()
+        for maneuver, found in drives.items()
+    ]
+    print_troubles(console, counted)
     for condition, policies in results.left_out.items():
         for policy, reason in policies.items():
             who = f"{escape(policy)}, {escape(condition)}"

@@ -8,6 +8,7 @@ from typing import Final
 from rich.console import Console
 from rich.markup import escape
 
+from .counted import print_troubles
 from .metrics import CUE_AXES, Metrics
 from .results import Results
 from .share import Share
@@ -184,7 +185,7 @@ def standings_table(results: Results) -> TextTable:
 
 
 def print_results(console: Console, results: Results) -> None:
-    """Show a table a maneuver, the summary of the suite, the verdicts and the failures."""
+    """Show a table a maneuver, the summary, the verdicts, what went wrong in solves, and failures."""
     for maneuver, drives in results.maneuvers.items():
         print_table(console, maneuver_table(maneuver, drives, results.shares.get(maneuver)))
     if results.standings:
@@ -192,6 +193,12 @@ def print_results(console: Console, results: Results) -> None:
     for verdict in results.verdicts:
         name = "Over the whole suite" if verdict.maneuver == "all" else verdict.maneuver
         console.print(f"[bold]{escape(name)}[/bold]: {escape(' '.join(verdict.sentences))}", highlight=False)
+    counted = [
+        (policy, maneuver, found)
+        for maneuver, policies in results.notes.items()
+        for policy, found in policies.items()
+    ]
+    print_troubles(console, counted)
     for policy, reason in results.left_out.items():
         console.print(f"[bold]left out[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
     for failure in results.failures:

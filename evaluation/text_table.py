@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -18,6 +21,12 @@ NOTHING: Final = "–"
 
 _LONGEST_NAME: Final = 40
 """Characters of a name that is shown whole, whatever the width."""
+_SHORTEST_NAME: Final = 8
+"""Characters a column of names keeps on the narrowest terminal."""
+_FRAME: Final = 3
+"""Characters a column takes beside its cells: two spaces and a line."""
+_PIPED: Final = 100_000
+"""Columns where the output is no terminal: every table and line fits."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +47,8 @@ class TextTable:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with significant digits."""
-    if value is None:
+    """A number with significant digits; a number that is no number has none."""
+    if value is None or math.isnan(value):
         return NOTHING
     if value == 0.0 or 1e-3 <= abs(value) < 1e5:
         decimals = digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)
@@ -67,23 +76,78 @@ def microseconds(value: float | None) -> str:
     return NOTHING if value is None else f"{1e6 * value:.0f}"
 
 
+def table_console() -> Console:
+    """Where tables are shown: as wide as the terminal; as wide as they need where there is none."""
+    return Console(width=None if sys.stdout.isatty() else _PIPED)
+
+
 def print_table(console: Console, table: TextTable) -> None:
-    """Show a table on a terminal."""
-    shown = Table(title=escape(table.title), title_justify="left", title_style="bold", header_style="dim")
-    # Names are what a reader looks for: they are never cut, as long as they are names.
-    names = min(max((len(row[0]) for row in table.rows), default=0), _LONGEST_NAME)
-    for i, name in enumerate(table.header):
-        left = {"justify": "left", "min_width": names} if i == 0 else {"justify": "right"}
-        shown.add_column(escape(name), **left)
-    for i, row in enumerate(table.rows):
-        shown.add_row(*(escape(cell) for cell in row), style="bold" if i in table.best else "")
-    console.print(shown)
+    """Show a table on a terminal; no number is ever cut.
+
+    Headers are broken where the terminal is narrow. Columns that still find no room follow in a table of
+    their own below, with the names again.
+    """
+    widths = _column_widths(table, console.width)
+    for i, columns in enumerate(_blocks(widths, console.width)):
+        title = table.title if i == 0 else f"{table.title} (continued)"
+        shown = Table(title=escape(title), title_justify="left", title_style="bold", header_style="dim")
+        for k in columns:
+            shown.add_column(
+                escape(table.header[k]),
+                justify="left" if k == 0 else "right",
+                width=widths[k],
+                overflow="fold",
+            )
+        for j, row in enumerate(table.rows):
+            cells = [escape(row[k]) for k in columns]
+            shown.add_row(*cells, style="bold" if j in table.best else "")
+        console.print(shown)
 
 
-def save_markdown(table: TextTable, path: str | Path) -> None:
-    """Write a table as Markdown; the rows to stress are bold."""
+def _column_widths(table: TextTable, width: int) -> list[int]:
+    """Of each column: whole headers if the table has room then, else as narrow as cells and words allow."""
+    cells = [max((cell_len(row[k]) for row in table.rows), default=0) for k in range(len(table.header))]
+    whole = [max(cell, cell_len(name)) for cell, name in zip(cells, table.header, strict=True)]
+    if sum(whole) + _FRAME * len(whole) + 1 <= width:
+        return whole
+    words = [max(cell_len(word) for word in [*name.split(), ""]) for name in table.header]
+    least = [max(cell, word) for cell, word in zip(cells, words, strict=True)]
+    # Beside the names the widest of the numbers must find room; names are folded before numbers are.
+    room = width - 1 - 2 * _FRAME - max(least[1:], default=0)
+    least[0] = min(least[0], max(_SHORTEST_NAME, min(room, _LONGEST_NAME)))
+    return least
+
+
+def _blocks(widths: Sequence[int], width: int) -> Iterator[list[int]]:
+    """Indices of the columns that find room side by side, the first in each; at least one beside it."""
+    block, used = [0], 1 + _FRAME + widths[0]
+    for k in range(1, len(widths)):
+        needed = _FRAME + widths[k]
+        if used + needed > width and len(block) > 1:
+            yield block
+            block, used = [0], 1 + _FRAME + widths[0]
+        block.append(k)
+        used += needed
+    yield block
+
+
+def markdown(table: TextTable) -> str:
+    """A table as Markdown; the rows to stress are bold."""
     lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
     for i, row in enumerate(table.rows):
         cells = [f"**{cell}**" if i in table.best else cell for cell in row]
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    write_text(path, "\n".join(lines) + "\n")
+    return "\n".join(lines)
+
+
+def save_markdown(path: str | Path, *parts: TextTable | str) -> None:
+    """Write tables and lines as Markdown, one below the other; several tables each below their title."""
+    titled = sum(isinstance(part, TextTable) for part in parts) > 1
+    texts: list[str] = []
+    for part in parts:
+        if isinstance(part, TextTable):
+            texts += [f"**{part.title}**"] if titled else []
+            texts.append(markdown(part))
+        else:
+            texts.append(part)
+    write_text(path, "\n\n".join(texts) + "\n")

@@ -1,4 +1,4 @@
-"""The command line that gives a command: for reports, and to do it again."""
+"""The command line that gives a command: for reports, and to do it again; and numbers with their noun."""
 
 from __future__ import annotations
 
@@ -22,3 +22,8 @@ def words_of(name: str, command: Any) -> list[str]:
         if not isinstance(value, bool):
             words += [str(item) for item in value] if isinstance(value, tuple) else [str(value)]
     return words
+
+
+def how_many(count: int, noun: str) -> str:
+    """A number and its noun: 1 drive, 2 drives."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

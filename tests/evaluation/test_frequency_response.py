@@ -19,6 +19,7 @@ from motion_cueing.baselines.washout.parameters import (
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation.frequency_probe import FrequencyTest
 from motion_cueing.evaluation.frequency_response import frequency_response
+from motion_cueing.evaluation.frequency_tables import response_table
 from motion_cueing.evaluation.metrics import CUE_AXES
 from motion_cueing.evaluation.policies import make_policy
 
@@ -121,7 +122,11 @@ def test_no_motion_answers_to_nothing():
     assert len(found.sinusoids) == 6
     for sinusoid in found.sinusoids:
         assert max(sinusoid.modulus.values()) < 1e-12
+        assert set(sinusoid.phase.values()) == {None}
         assert sinusoid.explained == 0.0
+    assert not np.any(found.response("f_x", "f_x"))
+    cells = {cell for row in response_table(found).rows for cell in row[1:]}
+    assert cells == {"0", "–"}
 
 
 class Told:

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from motion_cueing.evaluation.criteria import Criteria, References
 from motion_cueing.evaluation.figure_style import line_styles, new_figure
-from motion_cueing.evaluation.figures import _error
+from motion_cueing.evaluation.figures import _error, _spread, maneuver_figure, shown_policies
 from motion_cueing.evaluation.ladder import ALL_RUNGS, LADDER, ladder_names, rungs
-from motion_cueing.evaluation.ladder_figure import ladder_figure
+from motion_cueing.evaluation.ladder_figure import _errors, ladder_figure
 from motion_cueing.evaluation.ladder_table import ladder_table, save_ladder
 from motion_cueing.evaluation.metrics import measure
 from motion_cueing.evaluation.policies import policy_names
@@ -23,6 +23,7 @@ from motion_cueing.evaluation.results import Failure, Provenance, Results
 from motion_cueing.evaluation.selection import find_platform, find_policies
 from motion_cueing.evaluation.share import Share, gap_share, shares
 from motion_cueing.evaluation.tables import maneuver_table, share_table, standings_table
+from motion_cueing.evaluation.text_table import number
 
 from .synthetic import drive
 
@@ -192,3 +193,43 @@ def test_a_figure_of_a_maneuver_shows_the_share():
     assert texts[list(GAINS).index("optimum")].endswith("(1.00)")
     heights = sorted(text.xy[1] for text in axes.texts)
     assert min(np.diff(heights)) > 0.07
+
+
+def test_what_is_left_out_stands_below_the_table_and_one_drive_is_no_drives(tmp_path):
+    results = results_of(GAINS)
+    alone = Results.of({"weave": results.maneuvers["weave"]}, [], ORIGIN, left_out={"nmpc": "needs a solver"})
+    save_ladder(alone, tmp_path)
+    text = (tmp_path / "ladder.md").read_text()
+    assert text.endswith("|\n\nLeft out: nmpc: needs a solver\n")
+    assert ladder_table(alone).title == "The ladder, means over 1 drive"
+
+
+def test_bars_are_labelled_as_in_the_table():
+    found = rungs(results_of(GAINS))
+    small = [replace(r, standing=replace(r.standing, cue_error=3e-6)) for r in found[:1]] + found[1:]
+    axes = new_figure(4.0, 3.0).subplots()
+    _errors(axes, small)
+    texts = [text.get_text() for text in axes.texts]
+    assert texts[0] == f"◂ {number(3e-6)}" == "◂ 3.00e-06"
+    assert texts[1] == number(small[1].standing.cue_error)
+    assert axes.get_xlim()[0] >= 0.001
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))
+def test_numbers_beside_a_panel_lie_apart_and_below_its_title(heights):
+    moved = np.array(_spread(heights, 0.075))
+    assert moved.max() <= 1.0
+    assert np.all(np.diff(np.sort(moved)) > 0.0749)
+    order = np.argsort(heights, kind="stable")
+    assert np.all(np.diff(moved[order]) > 0.0)
+
+
+def test_a_figure_of_many_policies_shows_the_references_and_the_best():
+    gains = {f"p{i}": 0.02 * i for i in range(10)} | {"classical-tuned": 0.0, "optimum": 0.1}
+    drives = {name: drive(gain, policy=name) for name, gain in gains.items()}
+    shown = shown_policies(drives, Criteria())
+    assert shown[:2] == ["classical-tuned", "optimum"]
+    assert sorted(shown[2:]) == [f"p{i}" for i in range(4, 10)]
+    few = {name: drives[name] for name in list(drives)[:8]}
+    assert shown_policies(few, Criteria()) == list(few)
+    assert maneuver_figure(drives, list(drives)).startswith(b"\x89PNG")

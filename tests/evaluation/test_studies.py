@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from motion_cueing.baselines import ceiling
 from motion_cueing.baselines.ceiling import CeilingWashout, load_ceiling
@@ -15,12 +17,13 @@ from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import study as study_module
+from motion_cueing.evaluation import study_figures
 from motion_cueing.evaluation.study import Condition, run_study
 from motion_cueing.evaluation.study_command import results_of
 from motion_cueing.evaluation.study_figures import heat_figure, lines_figure
 from motion_cueing.evaluation.study_results import StudyResults
 from motion_cueing.evaluation.study_store import identity
-from motion_cueing.evaluation.study_tables import condition_table, matrix_table
+from motion_cueing.evaluation.study_tables import condition_table, matrix_table, print_study, share_tables
 
 from .studies import PAPER, SEDAN, bend
 from .synthetic import drive
@@ -232,3 +235,45 @@ def test_results_are_written_read_and_drawn(roll, tmp_path):
     (tmp_path / "study.json").write_text('{"schema": 9}')
     with pytest.raises(DataError, match="version 9"):
         StudyResults.load_json(tmp_path / "study.json")
+
+
+def test_the_share_under_every_condition_has_a_table_and_a_panel(roll, tmp_path, monkeypatch):
+    results, _ = study_of(CONDITIONS, tmp_path)
+    # The perceived optimum is not among the policies.
+    (table,) = share_tables(results)
+    assert table.header == ("policy", *results.conditions)
+    whole, locked = (found["mine"].share for found in results.summaries.values())
+    assert table.rows[2] == ("mine", f"{whole:.2f}", f"{locked:.2f}")
+    drawn = []
+    monkeypatch.setattr(study_figures, "png", lambda figure: drawn.append(figure) or b"")
+    lines_figure(results)
+    without, _ = study_of(CONDITIONS, tmp_path, {"no-motion": "no-motion", "mine": "mine"})
+    lines_figure(without)
+    assert [len(figure.axes) for figure in drawn] == [4, 2]
+    assert drawn[0].axes[1].get_title("left").startswith("Share of the gap")
+    assert share_tables(without) == []
+
+
+def test_a_value_near_0_does_not_squeeze_the_others(roll, tmp_path, monkeypatch):
+    results, _ = study_of(CONDITIONS, tmp_path)
+    summaries = {
+        name: {**found, "optimum": replace(found["optimum"], cue_error=1e-6)}
+        for name, found in results.summaries.items()
+    }
+    drawn = []
+    monkeypatch.setattr(study_figures, "png", lambda figure: drawn.append(figure) or b"")
+    lines_figure(replace(results, summaries=summaries))
+    axes = drawn[0].axes[0]
+    assert axes.get_ylim()[0] == pytest.approx(0.008)
+    assert axes.get_title("right") == "▾ below 0.01"
+    line = next(line for line in axes.lines if line.get_label() == "optimum")
+    np.testing.assert_allclose(line.get_ydata(), 0.01)
+
+
+def test_solves_that_went_wrong_are_told_by_condition_and_drive(roll, tmp_path):
+    results, _ = study_of(CONDITIONS, tmp_path)
+    counted = {"mpc_solves": "9", "mpc_relaxed": "2"}
+    noted = replace(results, notes={"paper": {"mine": {"bend": counted}}})
+    console = Console(width=300, file=io.StringIO())
+    print_study(console, noted, "t", False)
+    assert "counted mine: 2 of 9 solves with a limit relaxed (paper bend 2 of 9)" in console.file.getvalue()
