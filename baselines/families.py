@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeAlias
 
 from pydantic import Discriminator, Tag
 
-from ..envs.errors import ConfigurationError, UnknownNameError, look_up
+from ..envs.errors import ConfigurationError, UnknownNameError
 from ..envs.platform.machines import Cab
 from ..envs.settings import from_dict, read_yaml
 from .adaptive import AdaptiveParameters, AdaptiveWashout, adaptive_presets, load_adaptive
@@ -17,6 +17,7 @@ from .adaptive.policy import ADAPTIVE
 from .optimal_washout import OptimalParameters, OptimalWashout, load_optimal, optimal_presets
 from .optimal_washout.policy import OPTIMAL
 from .policy import Policy
+from .presets import named
 from .washout import ClassicalWashout, WashoutParameters, load_washout, washout_presets
 from .washout.classical import CLASSICAL
 from .washout.family import Family
@@ -104,18 +105,36 @@ def load_parameters(name: str | Path) -> AnyWashout:
     A file says by ``algorithm`` which family it is of; without, it is a classical one.
 
     Raises:
-        UnknownNameError: no preset has this name, or no family the file's ``algorithm``.
+        UnknownNameError: no preset has this name.
         DataError: the file cannot be read.
         ConfigurationError: a field of it is wrong.
     """
     if Path(name).suffix in (".yaml", ".yml"):
         values = read_yaml(name)
-        algorithm = look_up("algorithm", algorithm_of(values), ALGORITHMS)
-        return from_dict(algorithm.parameters, values, str(name))  # type: ignore[no-any-return]
+        algorithm = ALGORITHMS[check_algorithm(algorithm_of(values), name, ALGORITHMS)]
+        cls = algorithm.parameters
+        return from_dict(cls, named(cls, values, name), str(name))  # type: ignore[no-any-return]
     for algorithm in ALGORITHMS.values():
         if str(name) in algorithm.presets():
             return algorithm.load(str(name))
     raise UnknownNameError("washout preset", str(name), family_presets())
+
+
+def check_algorithm(algorithm: str, path: str | Path, known: Iterable[str]) -> str:
+    """The algorithm that a file names.
+
+    Args:
+        algorithm: Found in the file.
+        path: Of the file, for the message.
+        known: That it may be.
+
+    Raises:
+        ConfigurationError: it is none of them.
+    """
+    if algorithm not in known:
+        names = ", ".join(known)
+        raise ConfigurationError(f"{path}: field 'algorithm' is {algorithm!r}; it is one of {names}")
+    return algorithm
 
 
 def load_of(family: str, name: str | Path) -> AnyWashout:

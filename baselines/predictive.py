@@ -8,6 +8,7 @@ from typing import Final
 from ..envs.platform.machines import Platform
 from ..envs.settings import from_dict
 from .policy import ForeknowingPolicy, Policy
+from .presets import named
 
 DESCRIPTIONS: Final = {
     "mpc": "predictive control that knows nothing of the drive ahead",
@@ -53,5 +54,7 @@ def predictive_from_file(
     from .nmpc import NmpcParameters, make_nmpc
 
     if values["algorithm"] == "nmpc":
-        return make_nmpc(platform, from_dict(NmpcParameters, values, str(path)), Path(path).stem)
-    return make_mpc(platform, from_dict(MpcParameters, values, str(path)), Path(path).stem)
+        nonlinear = from_dict(NmpcParameters, named(NmpcParameters, values, path), str(path))
+        return make_nmpc(platform, nonlinear, Path(path).stem)
+    linear = from_dict(MpcParameters, named(MpcParameters, values, path), str(path))
+    return make_mpc(platform, linear, Path(path).stem)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..envs.errors import UnknownNameError
-from ..envs.settings import load
+from ..envs.settings import from_dict, load, read_yaml
 
 T = TypeVar("T")
 
@@ -32,7 +33,26 @@ def load_preset(cls: type[T], kind: str, name: str | Path, folder: Path) -> T:
     """
     path = Path(name)
     if path.suffix in (".yaml", ".yml"):
-        return load(cls, path)
+        return from_dict(cls, named(cls, read_yaml(path), path), str(path))
     if str(name) not in preset_names(folder):
         raise UnknownNameError(kind, str(name), preset_names(folder))
     return load(cls, folder / f"{name}.yaml")
+
+
+def named(cls: type[Any], values: object, path: str | Path) -> object:
+    """Values of a user's file, in which ``name`` and ``description`` may stand or not, whatever it is of.
+
+    Args:
+        cls: The configuration it is of.
+        values: That stand in the file.
+        path: Of the file; its stem is the name unless one is given.
+    """
+    if not isinstance(values, dict):
+        return values
+    known = {field.name for field in fields(cls)}
+    if "algorithm" not in known and values.get("algorithm") == "classical":
+        # What a file is where it says nothing may be said.
+        values = {name: value for name, value in values.items() if name != "algorithm"}
+    if "name" in known:
+        return {"name": Path(path).stem, "description": f"set of {path}", **values}
+    return {name: value for name, value in values.items() if name not in ("name", "description")}

@@ -11,7 +11,14 @@ from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
 from ..envs.settings import read_yaml
 from .ceiling import CeilingWashout
-from .families import family_presets, load_parameters, make_washout
+from .families import (
+    ALGORITHMS,
+    algorithm_of,
+    check_algorithm,
+    family_presets,
+    load_parameters,
+    make_washout,
+)
 from .policy import ForeknowingPolicy, NoMotion, Policy
 from .predictive import DESCRIPTIONS, PREDICTIVE, make_predictive, predictive_from_file
 
@@ -96,6 +103,7 @@ def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPol
 
 def _from_file(path: Path, platform: Platform) -> Policy | ForeknowingPolicy:
     values = read_yaml(path)
-    if isinstance(values, dict) and values.get("algorithm") in PREDICTIVE:
+    algorithm = check_algorithm(algorithm_of(values), path, (*ALGORITHMS, *PREDICTIVE))
+    if isinstance(values, dict) and algorithm in PREDICTIVE:
         return predictive_from_file(values, path, platform)
     return make_washout(load_parameters(path), platform.cab)

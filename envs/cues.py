@@ -37,6 +37,9 @@ CSV_COLUMNS: Final = (
 _MOST_SAMPLES: Final = 10_000_000
 """Of a resampled trace: more than a day at 100 Hz, and about a gigabyte."""
 
+_LARGEST: Final = {"m_s2": (1000.0, "m/s^2"), "rad_s": (100.0, "rad/s")}
+"""More than any car does, by the end of a column's name: the column is in another unit, or damaged."""
+
 _TIME_TOLERANCE: Final = 1e-3
 """Largest deviation of a time step from the mean step, relative."""
 
@@ -192,7 +195,8 @@ class CueTrace:
         """Read a trace written by :meth:`to_csv`, or any CSV with :data:`CSV_COLUMNS`.
 
         Raises:
-            DataError: the file is empty, a column is missing, or a value is not a finite number.
+            DataError: the file is empty, a column is missing, or a value is not a finite number or beyond
+                what a car does (1000 m/s^2, 100 rad/s).
         """
         table = read_table(path)
         missing = [column for column in CSV_COLUMNS if column not in table]
@@ -201,6 +205,7 @@ class CueTrace:
                 f"{path}: missing column {', '.join(missing)}; found {', '.join(table)}. "
                 "`motion-cueing import` converts a log with other columns"
             )
+        _check_table(path, table)
         name = name or Path(path).name.removesuffix(".gz").removesuffix(".csv")
         try:
             return cls(
@@ -228,11 +233,11 @@ def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, 
     missing = [name for name in wanted if name not in header]
     if missing:
         raise DataError(f"{path}: missing column {', '.join(missing)}; found {', '.join(header)}")
-    return {name: _numbers(path, name, [row[header.index(name)] for row in rows]) for name in wanted}
+    return {name: _numbers(path, name, [row[header.index(name)] for _, row in rows]) for name in wanted}
 
 
-def _read_rows(path: str | Path) -> tuple[list[str], list[list[str]]]:
-    """Header and rows of a CSV file, all of one length."""
+def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header and rows of a CSV file, all of one length, each row with its line counted from 1."""
     try:
         content = Path(path).read_bytes()
         text = (gzip.decompress(content) if str(path).endswith(".gz") else content).decode("utf-8-sig")
@@ -249,7 +254,7 @@ def _read_rows(path: str | Path) -> tuple[list[str], list[list[str]]]:
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise DataError(f"{path}: line {line} has {len(row)} cells, the header has {len(header)}")
-    return header, [row for _, row in rows[1:]]
+    return header, rows[1:]
 
 
 def _numbers(path: str | Path, name: str, cells: list[str]) -> Floats:
@@ -257,6 +262,29 @@ def _numbers(path: str | Path, name: str, cells: list[str]) -> Floats:
         return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
     except ValueError as error:
         raise DataError(f"{path}: column {name}: {error}") from None
+
+
+def _check_table(path: str | Path, table: Mapping[str, Floats]) -> None:
+    """Refuse cells that are no finite number or no car's motion, by line and column."""
+    for name, values in table.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            many = f" ({len(bad)} such cells)" if len(bad) > 1 else ""
+            told = f"not a finite number{many}; fill the gap, or cut it out"
+            raise DataError(f"{path}: line {_line(path, bad[0])}, column {name}: {told}")
+    for name in CSV_COLUMNS[1:]:
+        largest, unit = next(bound for end, bound in _LARGEST.items() if name.endswith(end))
+        beyond = np.flatnonzero(np.abs(table[name]) > largest)
+        if len(beyond):
+            told = (
+                f"{table[name][beyond[0]]:g} is beyond {largest:g} {unit}, which no car does; check the unit"
+            )
+            raise DataError(f"{path}: line {_line(path, beyond[0])}, column {name}: {told}")
+
+
+def _line(path: str | Path, sample: int) -> int:
+    """The line of a CSV file, counted from 1, in which a sample stands."""
+    return _read_rows(path)[1][sample][0]
 
 
 def _checked(trace: str, label: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

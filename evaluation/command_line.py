@@ -7,13 +7,13 @@ import io
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final
 
 from ..envs.errors import ConfigurationError, MotionCueingError, look_up
-from .complaint import plain_complaint
+from .complaint import plain_complaint, plain_help
 
 PROGRAM: Final = "motion-cueing"
 SUCCESS: Final = 0
@@ -31,11 +31,13 @@ class Command:
         module: Relative to this package.
         arguments: Name of the dataclass in it that tyro turns into options.
         summary: One line for the overview.
+        goes_on: Whether the same command goes on where it was stopped.
     """
 
     module: str
     arguments: str
     summary: str
+    goes_on: bool = False
 
 
 COMMANDS: Final[Mapping[str, Command]] = {
@@ -54,14 +56,23 @@ COMMANDS: Final[Mapping[str, Command]] = {
         ".frequency_command", "FrequencyResponseCommand", "measure modulus and phase of what is felt"
     ),
     "compare": Command(
-        ".compare_command", "CompareCommand", "drive on several machines: how much does a controller need?"
+        ".compare_command",
+        "CompareCommand",
+        "drive on several machines: how much does a controller need?",
+        goes_on=True,
     ),
     "robustness": Command(
-        ".robustness_command", "RobustnessCommand", "drive with lag, delay, noise, another car, more fiercely"
+        ".robustness_command",
+        "RobustnessCommand",
+        "drive with lag, delay, noise, another car, more fiercely",
+        goes_on=True,
     ),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
     "demonstrate": Command(
-        ".demonstrate_command", "DemonstrateCommand", "record drives of a controller to learn from"
+        ".demonstrate_command",
+        "DemonstrateCommand",
+        "record drives of a controller to learn from",
+        goes_on=True,
     ),
 }
 
@@ -77,17 +88,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = next((argument for argument in arguments[:1] if not argument.startswith("-")), "")
-    return _guarded(f"{PROGRAM} {name}".strip(), lambda: _dispatch(arguments))
+    program = f"{PROGRAM} {name}".strip()
+    return _guarded(program, lambda: _dispatch(arguments), _interrupted(name, arguments))
 
 
-def _guarded(program: str, work: Callable[[], int]) -> int:
+def _interrupted(name: str, arguments: Sequence[str]) -> str:
+    """What is said after Ctrl-C."""
+    if name not in COMMANDS or not COMMANDS[name].goes_on:
+        return "interrupted"
+    fresh = " without --fresh" if "--fresh" in arguments else ""
+    return f"interrupted; drives that are done are kept, and the same command{fresh} goes on"
+
+
+def _guarded(program: str, work: Callable[[], int], interrupted: str) -> int:
     """Turn what can go wrong into one line and an exit status."""
     try:
         return work()
     except MotionCueingError as error:
         return _complain(program, str(error), BAD_ARGUMENTS)
     except KeyboardInterrupt:
-        return _complain(program, "interrupted", INTERRUPTED)
+        return _complain(program, interrupted, INTERRUPTED)
     except BrokenPipeError:
         # The reader (`head`) has gone; keep Python from complaining again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -141,12 +161,13 @@ def _parse(name: str, arguments: type[Any], rest: list[str]) -> Any:
 
     _refuse_repeated(arguments, rest)
     _refuse_nothing(arguments, rest)
-    complaint = io.StringIO()
+    complaint, shown = io.StringIO(), io.StringIO()
     try:
-        with redirect_stderr(complaint):
+        with redirect_stderr(complaint), redirect_stdout(shown):
             return tyro.cli(arguments, prog=f"{PROGRAM} {name}", args=rest)
     except SystemExit as stop:
         if not stop.code:
+            print(plain_help(shown.getvalue()), end="")
             return SUCCESS
         told = plain_complaint(complaint.getvalue())
         raise ConfigurationError(f"{told} See `{PROGRAM} {name} --help`") from None

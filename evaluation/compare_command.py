@@ -12,7 +12,7 @@ from tyro.conf import FlagCreatePairsOff, arg
 from ..envs.errors import ConfigurationError
 from .ladder import ALL_RUNGS
 from .selection import ALL, find_car, find_maneuvers, find_platform, find_policies
-from .study_command import check_folder, run_and_save
+from .study_command import prepare, run_and_save
 from .words import words_of
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def run(command: CompareCommand) -> int:
     car = find_car(command.car)
     maneuvers = find_maneuvers(command.maneuvers, car)
     policies = find_policies(command.policies, next(iter(machines.values())))
-    check_folder(command.out, command.fresh)
+    prepare(command.out, command.fresh)
     conditions = [
         Condition(name, machine.description, machine, car, maneuvers, partial(policy_on, platform=machine))
         for name, machine in machines.items()

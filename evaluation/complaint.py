@@ -1,4 +1,4 @@
-"""What tyro says in a framed panel about wrong arguments, in sentences that name the option and the fix."""
+"""What tyro says about arguments in plain words: what is wrong with them, and its help."""
 
 from __future__ import annotations
 
@@ -24,6 +24,26 @@ def plain_complaint(panel: str) -> str:
     near = dict.fromkeys(re.findall(r"(?<!\S)--[a-z][a-z-]*", suggested))
     hint = f" Did you mean {' or '.join(near)}?" if near else ""
     return f"{_reworded(told.strip()).rstrip('.')}.{hint}"
+
+
+def plain_help(text: str) -> str:
+    """Tyro's help without what stands for an option that is not given; its own text says what then happens.
+
+    Everything keeps its place, so that frames stay whole.
+
+    Args:
+        text: What tyro wrote for ``--help``.
+    """
+
+    def blank(found: re.Match[str]) -> str:
+        return re.sub(r"[^\s│|]", " ", found[0])
+
+    def bare(found: re.Match[str]) -> str:
+        return found[1].strip("{}").ljust(len(found[0]))
+
+    # The width of the terminal may break a line within the brackets.
+    text = re.sub(r"\(default:[\s│|]*(?:None)?\)", blank, text)
+    return re.sub(r"\{None\}\|(\{[^}]*\}|[A-Z]+)", bare, text)
 
 
 def _reworded(told: str) -> str:

@@ -15,6 +15,7 @@ from tyro.conf import Positional, arg
 
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.storage import replacing
+from ..envs.targets import check_file
 from .figure_style import RC, new_figure, styled
 
 Curve = NDArray[np.float64]
@@ -51,6 +52,7 @@ def run(command: CurvesCommand) -> int:
         raise ConfigurationError("RUNS: name at least one folder of a training")
     if command.out.suffix not in _SUFFIXES:
         raise ConfigurationError(f"--out {command.out}: name a file that ends in {' or '.join(_SUFFIXES)}")
+    check_file("--out", command.out)
     curves = {path: read_curve(path, command.scalar) for path in command.runs}
     groups = grouped(curves)
     with styled():

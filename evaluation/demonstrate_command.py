@@ -13,14 +13,8 @@ from tyro.conf import arg
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.settings import to_dict
-from ..train.demonstrations import (
-    INDEX,
-    DriveEntry,
-    Index,
-    is_kept,
-    load_index,
-    save_drive,
-)
+from ..envs.targets import check_folder
+from ..train.demonstrations import INDEX, DriveEntry, Index, is_kept, load_index, save_drive
 from ..train.provenance import command_line, commit, hardware, now, versions
 from .demonstration import Demonstrator, demonstrate
 from .metrics import measure
@@ -28,6 +22,7 @@ from .recording import notes_of
 from .selection import find_car, find_maneuvers, find_platform
 from .suite import CueSource
 from .suite_progress import suite_progress
+from .text_table import number
 
 _SUCCESS: Final = 0
 
@@ -45,7 +40,7 @@ class DemonstrateCommand:
     objective: Literal["J", "perceived"] = "J"
     """What the optimum minimises: J, or J of what the driver senses."""
     maneuver: Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")] = ()
-    """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
+    """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them; default: none."""
     random: int = 0
     """Random drives beside them."""
     seed: int = 0
@@ -66,6 +61,7 @@ def run(command: DemonstrateCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong, or the folder holds another recording.
     """
+    check_folder("--out", command.out)
     platform = find_platform(command.platform)
     demonstrator = Demonstrator.of(_policy_name(command), platform)
     sources = _sources(command)
@@ -186,4 +182,4 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
 def _summary(folder: Path, index: Index, recorded: int) -> str:
     steps = sum(entry.steps for entry in index.drives)
     mean = sum(entry.cue_error for entry in index.drives) / max(len(index.drives), 1)
-    return f"{folder}: {len(index.drives)} drives ({recorded} new), {steps} steps, mean J {mean:.4f}"
+    return f"{folder}: {len(index.drives)} drives ({recorded} new), {steps} steps, mean J {number(mean)}"

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, DataError, MotionCueingError
+from ..envs.errors import ConfigurationError, MotionCueingError
 from ..envs.settings import to_dict
 from ..envs.storage import write_bytes
+from ..envs.targets import check_folder, check_own_json
 from .figures import maneuver_figure
 from .file_names import file_names
 from .ladder import ALL_RUNGS
@@ -48,7 +49,7 @@ class EvaluateCommand:
     """
 
     policy: Names = ()
-    """Policies, by name or file; without it, the ones meant for comparison; `ladder` for all controllers."""
+    """Policies, by name or file; default: the ones meant for comparison; `ladder` for all controllers."""
     maneuver: Names = (ALL,)
     """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
     platform: Name = "paper"
@@ -136,8 +137,8 @@ def make_plan(command: EvaluateCommand) -> Plan:
     """
     if not command.maneuver:
         raise ConfigurationError("--maneuver needs at least one name; `all` stands for every maneuver")
-    if command.out.exists() and not command.out.is_dir():
-        raise DataError(f"--out {command.out} is a file; name a folder")
+    check_folder("--out", command.out)
+    check_own_json("--out", command.out / "results.json", frozenset({"schema", "provenance"}))
     platform, car = find_platform(command.platform), find_car(command.car)
     policies, left_out = _line_up(command, platform, car)
     return Plan(
@@ -224,4 +225,6 @@ def _run_paper(command: EvaluateCommand) -> int:
         )
     from .paper import run as run_paper
 
+    check_folder("--out", command.out)
+    check_own_json("--out", command.out / "paper.json", frozenset({"schema", "checks"}))
     return run_paper(command.out)

@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from ..envs.errors import ConfigurationError
+from ..envs.targets import check_file
 from .policies import find_agent
 
 
@@ -33,6 +34,7 @@ def run(command: ExportCommand) -> int:
     """
     if command.onnx.suffix != ".onnx":
         raise ConfigurationError(f"--onnx {command.onnx}: name a file that ends in .onnx")
+    check_file("--onnx", command.onnx)
     agent = find_agent(command.policy)
     from ..train.agent.export import CHECKED, export_onnx
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 from rich.markup import escape
 from tyro.conf import FlagCreatePairsOff, arg
 
-from ..envs.errors import ConfigurationError, DataError, MotionCueingError, look_up
+from ..envs.errors import ConfigurationError, MotionCueingError, look_up
 from ..envs.storage import write_bytes
+from ..envs.targets import check_folder, check_own_json
 from .frequency_probe import OMCT_FREQUENCIES, FrequencyTest
 from .frequency_tables import response_table, save_csv, save_json
 from .ladder import ALL_RUNGS
@@ -112,8 +113,8 @@ def measure_all(command: FrequencyResponseCommand) -> Measured:
     from .frequency_response import frequency_response
 
     test, axes = _test(command), _axes(command)
-    if command.out.exists() and not command.out.is_dir():
-        raise DataError(f"--out {command.out} is a file; name a folder")
+    check_folder("--out", command.out)
+    check_own_json("--out", command.out / "frequency-response.json", frozenset({"schema", "responses"}))
     platform = find_platform(command.platform)
     policies, left_out = _line_up(command, platform)
     found = Measured(left_out=left_out)

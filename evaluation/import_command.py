@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -15,6 +14,7 @@ from ..envs.car.importing import import_log
 from ..envs.car.log_columns import parse_columns
 from ..envs.errors import ConfigurationError
 from ..envs.storage import write_bytes
+from ..envs.targets import check_file
 
 _MOST_DECIMALS = 15
 """More digits than a double has are noise."""
@@ -53,8 +53,8 @@ def run(command: ImportCommand) -> int:
     if command.decimals is not None and not 0 <= command.decimals <= _MOST_DECIMALS:
         raise ConfigurationError(f"decimals is {command.decimals}; use 0 to {_MOST_DECIMALS}")
     if command.out.resolve() == command.file.resolve():
-        raise ConfigurationError(f"out: {command.out} is the log itself; name another file")
-    _check_target("out", command.out)
+        raise ConfigurationError(f"--out {command.out} is the log itself; name another file")
+    check_file("--out", command.out)
     if command.plot is not None:
         _check_plot(command.plot, command)
     columns, units = parse_columns(chain.from_iterable(command.column))
@@ -73,30 +73,7 @@ def run(command: ImportCommand) -> int:
 
 def _check_plot(plot: Path, command: ImportCommand) -> None:
     if plot.suffix.lower() != ".png":
-        raise ConfigurationError(f"plot: {plot} does not end in .png, the only format of the picture")
+        raise ConfigurationError(f"--plot {plot} does not end in .png, the only format of the picture")
     if plot.resolve() in (command.file.resolve(), command.out.resolve()):
-        raise ConfigurationError(f"plot: {plot} is the log or the cues; name another file")
-    _check_target("plot", plot)
-
-
-def _check_target(option: str, path: Path) -> None:
-    """Refuse a file that cannot be written, before the work and before anything else is written."""
-    folder = next(parent for parent in path.absolute().parents if parent.exists())
-    if path.is_dir():
-        raise ConfigurationError(f"{option}: {path} is a folder; name a file")
-    try:
-        probe(folder)
-    except OSError as error:
-        raise ConfigurationError(
-            f"{option}: {path} cannot be written ({error.strerror}); name another folder"
-        ) from None
-
-
-def probe(folder: Path) -> None:
-    """Make a file in a folder, and remove it: permissions alone do not tell (read-only disks, root).
-
-    Raises:
-        OSError: the folder takes no files.
-    """
-    with tempfile.TemporaryFile(dir=folder):
-        pass
+        raise ConfigurationError(f"--plot {plot} is the log or the cues; name another file")
+    check_file("--plot", plot)

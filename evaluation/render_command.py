@@ -14,6 +14,7 @@ from tyro.conf import arg
 
 from ..envs.errors import ConfigurationError
 from ..envs.rendering import FRAMES_PER_SECOND, Renderer
+from ..envs.targets import check_file
 from .film import Picture, check_suffix, film_frames, frame_rows, gif_rate, save_film
 from .selection import find_car, find_maneuvers, find_platform, find_policies
 from .trajectory import Trajectory
@@ -42,7 +43,7 @@ class RenderCommand:
     car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
     """Car, by name or YAML file."""
     begin: float | None = None
-    """Time of the first frame, s; of a png the moment shown (default: the middle of the drive)."""
+    """Time of the first frame, s; of a png the moment shown, default: the middle of the drive."""
     end: float | None = None
     """Time of the last frame, s; default: the end of the drive."""
     size: tuple[int, int] | None = None
@@ -60,6 +61,7 @@ def run(command: RenderCommand) -> int:
     suffix = check_suffix(command.out)
     if suffix == ".png" and (command.end is not None or command.rate is not None):
         raise ConfigurationError("a png shows one moment, --begin; leave --end and --rate out")
+    check_file("--out", command.out)
     size = command.size or (_GIF_SIZE if suffix == ".gif" else _FILM_SIZE)
     # Made before anything is driven, so that a wrong size or a missing package is told at once.
     renderer = Renderer(find_platform(command.platform), size)

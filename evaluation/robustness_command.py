@@ -12,7 +12,7 @@ from tyro.conf import FlagCreatePairsOff, arg
 
 from .ladder import ALL_RUNGS, ladder_names
 from .selection import find_car, find_maneuvers, find_platform, find_policies
-from .study_command import check_folder, run_and_save
+from .study_command import prepare, run_and_save
 from .words import words_of
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class RobustnessCommand:
     policies: Names = (ALL_RUNGS,)
     """Policies, by name or file; `ladder` for every controller that is not told the drive beforehand."""
     maneuvers: Names = ()
-    """Maneuvers and recordings, by name or cue CSV file; without it, the standard maneuvers."""
+    """Maneuvers and recordings, by name or cue CSV file; default: the standard maneuvers."""
     platform: Name = "paper"
     """Motion base, by name or YAML file."""
     car: Name = "sedan"
@@ -68,7 +68,7 @@ def run(command: RobustnessCommand) -> int:
 
     study = make_study(command)
     policies = find_policies(command.policies, study.platform)
-    check_folder(command.out, command.fresh)
+    prepare(command.out, command.fresh)
     return run_and_save(
         study.conditions(),
         policies,

@@ -47,14 +47,14 @@ def find_car(name: str) -> Car:
 def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
     """Label and name (or file) of each policy; those meant for a machine where none is named.
 
-    `ladder` stands for its policies.
+    `ladder` stands for its policies. A file is never labelled as a shipped policy: shares refer to those.
     """
     from .policies import default_policies, policy_names
 
     known = policy_names()
     asked = list(names) or default_policies(platform)
     wanted = [name for given in asked for name in (ladder_names(known) if given == ALL_RUNGS else [given])]
-    found = labels(wanted, [_label("policy", name, [*known, ALL_RUNGS]) for name in wanted])
+    found = labels(wanted, [_label("policy", name, [*known, ALL_RUNGS]) for name in wanted], known)
     return {label: name for name, label in found.items()}
 
 

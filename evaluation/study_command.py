@@ -8,27 +8,29 @@ from datetime import datetime, timezone
 from pathlib import Path
 from shlex import join
 
-from ..envs.errors import DataError
 from ..envs.storage import write_bytes
+from ..envs.targets import check_folder, check_own_json
 from .criteria import Criteria
 from .provenance import versions
 from .study import Condition, StudyOutcome, run_study
 from .study_results import SCHEMA, StudyResults, common_maneuvers, summarise
+from .study_store import check_kept
 from .study_tables import matrix_table, print_study, share_tables
 from .suite_progress import suite_progress
 from .text_table import save_markdown, table_console
 
 
-def check_folder(out: Path, fresh: bool) -> None:
-    """Refuse a file; with ``fresh``, forget the drives that are kept.
+def prepare(out: Path, fresh: bool) -> None:
+    """Refuse a folder that cannot be used; with ``fresh``, forget the drives that are kept.
 
     Raises:
-        DataError: ``out`` is a file.
+        DataError: ``out`` cannot be written, holds another's study.json, or drives that are damaged.
     """
-    if out.exists() and not out.is_dir():
-        raise DataError(f"--out {out} is a file; name a folder")
+    check_folder("--out", out)
+    check_own_json("--out", out / "study.json", frozenset({"schema", "conditions"}))
     if fresh:
         shutil.rmtree(out / "pairs", ignore_errors=True)
+    check_kept(out)
 
 
 def run_and_save(

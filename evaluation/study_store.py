@@ -67,11 +67,7 @@ class PairStore:
     def _load(self, condition: str, policy: str) -> KeptPair:
         if not self._path.exists():
             return KeptPair(condition, policy, {})
-        try:
-            values = json.loads(self._path.read_text(encoding="utf-8"))
-            return from_dict(KeptPair, values, str(self._path))
-        except (OSError, ValueError) as error:
-            raise DataError(f"{self._path}: cannot be read ({error}); delete it, or add --fresh") from None
+        return _read(self._path)
 
     def find(self, maneuver: str, key: str) -> KeptDrive | None:
         """A drive that is done, if nothing about it has changed."""
@@ -82,6 +78,39 @@ class PairStore:
         """Write a drive down at once, whole or not at all."""
         self._pair.drives[maneuver] = drive
         write_text(self._path, json.dumps(to_dict(self._pair), allow_nan=False) + "\n")
+
+
+def _read(path: Path) -> KeptPair:
+    try:
+        return from_dict(KeptPair, json.loads(path.read_text(encoding="utf-8")), str(path))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError:
+        # Which of its many numbers is wrong helps nobody.
+        raise DataError(f"{path}: damaged, not the drives of a study; delete it, or add --fresh") from None
+
+
+def check_kept(folder: Path) -> None:
+    """Refuse damaged files of drives, all at once.
+
+    Args:
+        folder: Of the study.
+
+    Raises:
+        DataError: files are damaged.
+    """
+    damaged = [path for path in sorted((folder / "pairs").glob("*.json")) if not _readable(path)]
+    if damaged:
+        names = ", ".join(map(str, damaged))
+        raise DataError(f"{names}: damaged, not the drives of a study; delete them, or add --fresh")
+
+
+def _readable(path: Path) -> bool:
+    try:
+        _read(path)
+    except DataError:
+        return False
+    return True
 
 
 def identity(name: str, policy: Any) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -121,19 +121,20 @@ def explain(error: Exception) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def labels(names: Sequence[str], stems: Sequence[str]) -> dict[str, str]:
+def labels(names: Sequence[str], stems: Sequence[str], reserved: Collection[str] = ()) -> dict[str, str]:
     """A label for each of the names asked for: its stem, numbered where two stems are equal.
 
     Args:
         names: As the user wrote them; repeated ones count once.
         stems: A short label for each.
+        reserved: Labels that only a name that is the same may have: a file is no shipped policy.
     """
     found: dict[str, str] = {}
     for name, stem in zip(names, stems, strict=True):
         if name in found:
             continue
         label, number = stem, 2
-        while label in found.values():
+        while label in found.values() or (label in reserved and label != name):
             label, number = f"{stem}-{number}", number + 1
         found[name] = label
     return found

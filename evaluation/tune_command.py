@@ -1,4 +1,4 @@
-"""``motion-cueing tune``: find the parameters with which an algorithm is at its best."""
+"""``motion-cueing tune``: search for an algorithm's best parameters."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.settings import to_dict
 from ..envs.storage import write_text
+from ..envs.targets import check_file
 from ..train.interrupt import Interrupt
 from ..train.provenance import command_line, commit, hardware, now, versions
 from .selection import find_car, find_maneuvers, find_platform
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 _SUCCESS: Final = 0
 _INTERRUPTED: Final = 130
+_MADE_BY: Final = "Made by: "
+"""What a file of this command begins with."""
 _TRACK: Final = "random track drive"
 """Source of a random drive on a handling track."""
 
@@ -50,24 +53,26 @@ class TuneCommand:
     """Random drives, or maneuvers and recordings by name or cue CSV file."""
     limits: Literal["roads", "all"] = "roads"
     """Where no limit of the machine may be met: on roads, or also in random drives on a track."""
-    drives: int | None = None
-    """Random drives, each of a minute; default: 256."""
-    budget: float | None = None
-    """Hours to simulate; default: 1000."""
-    seed: int | None = None
-    """Of everything that the search draws; default: 0."""
-    start: Annotated[str | None, arg(metavar="NAME|FILE")] = None
-    """Set to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it.
-    Default: the set of the algorithm that is set by hand."""
+    drives: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 256)")] = None
+    """Random drives, each of a minute."""
+    budget: Annotated[float | None, arg(metavar="HOURS", help_behavior_hint="(default: 1000)")] = None
+    """Hours to simulate; generations up to the next trial on all drives, five at most, follow."""
+    seed: Annotated[int | None, arg(metavar="S", help_behavior_hint="(default: 0)")] = None
+    """Of everything that the search draws."""
+    start: Annotated[
+        str | None, arg(metavar="NAME|FILE", help_behavior_hint="(default: the set that is set by hand)")
+    ] = None
+    """Set to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it."""
     platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
     """Motion base, by name or YAML file."""
     car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
     """Car that drives named maneuvers, by name or YAML file."""
     threads: int = 1
     """Cores to use."""
-    out: Annotated[Path | None, arg(metavar="FILE.yaml")] = None
-    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json.
-    Default: classical-tuned.yaml, adaptive-tuned.yaml or optimal-washout-tuned.yaml."""
+    out: Annotated[
+        Path | None, arg(metavar="FILE.yaml", help_behavior_hint="(default: my-classical.yaml and so on)")
+    ] = None
+    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json."""
     resume: Annotated[bool, FlagCreatePairsOff] = False
     """Go on with the search kept beside --out; --budget may extend it."""
 
@@ -90,15 +95,15 @@ def run(command: TuneCommand) -> int:
     status = search.status
     if stopped:
         on = f"motion-cueing tune {command.algorithm} --out {_out(command)} --resume"
-        print(f"stopped after {status.hours:.0f} h; go on with: {on}", file=sys.stderr)
+        print(f"stopped after {status.hours:.3g} h; go on with: {on}", file=sys.stderr)
         return _INTERRUPTED
     if status.hours < search.options.budget:
-        print(f"nothing better to be found after {status.hours:.0f} h", file=sys.stderr)
+        print(f"nothing better to be found after {status.hours:.3g} h", file=sys.stderr)
     return _SUCCESS
 
 
 def _out(command: TuneCommand) -> Path:
-    return command.out or Path(f"{ALGORITHMS[command.algorithm].start}-tuned.yaml")
+    return command.out or Path(f"my-{ALGORITHMS[command.algorithm].start}.yaml")
 
 
 def _check(command: TuneCommand) -> None:
@@ -106,11 +111,21 @@ def _check(command: TuneCommand) -> None:
         raise ConfigurationError(f"--out {command.out}: a policy's file ends in .yaml")
     if command.threads < 1:
         raise ConfigurationError(f"--threads must be at least 1, found {command.threads}")
+    if command.drives is not None and "train" not in command.maneuvers:
+        raise ConfigurationError("--drives counts random drives; leave it out, or add `train` to --maneuvers")
+    _check_out(_out(command))
     kept = _kept(command)
     if not command.resume and kept.exists():
         raise ConfigurationError(f"{kept} holds a search; go on with --resume, or name another --out")
     if command.resume:
         _check_resumed(command)
+
+
+def _check_out(out: Path) -> None:
+    """Refuse what cannot be written, and a file that no search has made: a set by hand is not replaced."""
+    check_file("--out", out)
+    if out.exists() and not out.read_bytes().startswith(f"# {_MADE_BY}".encode()):
+        raise DataError(f"{out} was not written by this command; move it away, or name another --out")
 
 
 def _check_resumed(command: TuneCommand) -> None:
@@ -204,12 +219,15 @@ def _write(command: TuneCommand, search: Search) -> None:
     goal = "J" if options.objective == "J" else "perceived J"
     name, drives = _out(command).stem, len(search.objective.drives)
     many = f"{drives} random drives" if options.maneuvers == ("train",) else ", ".join(options.maneuvers)
-    tuned = search.result(name, f"{options.start.name} at its best: tuned by {how} for {goal} on {many}")
+    spent = f"{search.status.hours:.3g} h"
+    told = f"{options.start.name} tuned with {spent} by {how} for {goal} on {many}"
+    tuned = search.result(name, told)
     notes = [
-        f"Made by: {search.command}" + (", stopped and resumed" if command.resume else ""),
+        f"{_MADE_BY}{search.command}" + (", stopped and resumed" if command.resume else ""),
         f"{now()}, commit {commit() or 'unknown'}, {hardware('cpu')}",
         ", ".join(f"{package} {version}" for package, version in versions().items()),
-        f"{search.status.hours:.0f} h simulated in {search.status.steps} steps, seed {options.seed}",
+        f"{spent} simulated in {search.status.steps} steps (budget {options.budget:g} h, and what was begun "
+        f"until the next trial on all drives), seed {options.seed}",
         *_scores(f"on the {many} of the search", search.objective, options.start, tuned),
     ]
     if "train" in options.maneuvers:

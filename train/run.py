@@ -10,6 +10,7 @@ from typing import Any, Final
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.settings import load, save
 from ..envs.storage import write_text
+from ..envs.targets import check_folder
 from . import provenance
 from .checkpoint import checkpoint_file, checkpoints_in, read_checkpoint, write_checkpoint
 from .config import TrainingConfig
@@ -143,8 +144,9 @@ def free_folder(path: Path | None, name: str) -> Path:
         number = 1
         while (_DEFAULT_PARENT / f"{name}-{number}").exists():
             number += 1
-        return _DEFAULT_PARENT / f"{name}-{number}"
+        path = _DEFAULT_PARENT / f"{name}-{number}"
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         hint = f"use --resume {path} to go on with it" if (path / _CONFIG).exists() else "name a new one"
         raise ConfigurationError(f"--out {path}: there is something already; {hint}")
+    check_folder("--out", path)
     return path

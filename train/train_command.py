@@ -37,7 +37,7 @@ class TrainCommand:
     initial: Annotated[Path | None, arg(metavar="FILE.safetensors")] = None
     """Agent to go on from, with the same observation and action."""
     steps: Annotated[int | None, arg(metavar="N")] = None
-    """Actions in all, over all environments."""
+    """Actions in all, over all environments; default: as the configuration says, like the next two."""
     seed: Annotated[int | None, arg(metavar="S")] = None
     """Of everything that is drawn."""
     envs: Annotated[int | None, arg(metavar="N")] = None

@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from ...envs.errors import DataError
+from ...envs.errors import ConfigurationError, DataError
 from ...envs.settings import configuration, from_dict, to_dict
 from ...envs.storage import write_text
 from ..families import AnyWashout
@@ -20,6 +20,8 @@ from .method import Found, Method
 from .objective import LIMIT_SLOPE, LIMIT_STEP, Objective
 from .options import TuningOptions
 from .space import WashoutSpace
+
+_ANEW: Final = "begin anew: delete it, or name another --out"
 
 
 @configuration
@@ -81,7 +83,7 @@ class Search:
         self.space = WashoutSpace(options.start)
         self.found: list[Found] = []
         self._method = _method(options, self.space)
-        self._names, self._inputs = names, checksum(objective, self.space, self._method)
+        self._names, self._inputs = names, checksum(options, objective, self.space, self._method)
 
     def resume(self, record: Record) -> None:
         """Go through the steps of an earlier session again, without simulating.
@@ -91,8 +93,9 @@ class Search:
         """
         if record.inputs != self._inputs:
             raise DataError(
-                "drives, machine, ranges or settings of the search, or the version of motion-cueing-gym or "
-                "cma have changed since this search was begun; begin it anew, with another --out"
+                "options, drives, machine, ranges or settings of the search, or the version of "
+                "motion-cueing-gym or cma have changed since this search was begun; begin it anew, with "
+                "another --out"
             )
         try:
             for found in record.found:
@@ -149,24 +152,33 @@ def load_record(path: Path) -> Record:
     """The file of a search.
 
     Raises:
-        DataError: there is none, or it is broken.
-        ConfigurationError: a field of it is wrong.
+        DataError: there is none, it is broken, or a field of it is wrong.
     """
     try:
         values: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: no search can be read ({error})") from None
-    return from_dict(Record, values, str(path))
+    except OSError as error:
+        raise DataError(
+            f"{path}: no search can be read ({error.strerror}); begin one without --resume"
+        ) from None
+    except ValueError as error:
+        raise DataError(f"{path}: no search can be read ({error}); {_ANEW}") from None
+    try:
+        return from_dict(Record, values, str(path))
+    except ConfigurationError as error:
+        told, *others = str(error).removeprefix(f"{path}: ").split("; ")
+        more = f", and {len(others)} more" if others else ""
+        raise DataError(f"{path}: no search of this version ({told}{more}); {_ANEW}") from None
 
 
-def checksum(objective: Objective, space: WashoutSpace, method: Method) -> str:
-    """SHA-256 of what decides, beside the options, what the steps of a search find and mean.
+def checksum(options: TuningOptions, objective: Objective, space: WashoutSpace, method: Method) -> str:
+    """SHA-256 of what decides what the steps of a search find and mean.
 
-    Drives and where limits may be met in them, the machine, what costs, every coordinate with its range, the
-    constants of the method, and versions.
+    Every option but the budget, which may be extended; drives and where limits may be met in them, the
+    machine, what costs, every coordinate with its range, the constants of the method, and versions.
     """
     parts = {
         "package": _version(),
+        "options": to_dict(replace(options, budget=1.0)),
         "drives": [drive.digest() for drive in objective.drives],
         "spared": sorted(objective.spared),
         "machine": to_dict(objective.platform),

@@ -47,11 +47,21 @@ def check_geometry(hexapod: Hexapod) -> None:
     """Refuse a hexapod that does not hold its platform at neutral.
 
     Raises:
-        GeometryError: the Jacobian at neutral is singular: legs are parallel or all meet one line.
+        GeometryError: the platform is below its base, or the Jacobian at neutral is singular: legs are
+            parallel or all meet one line.
     """
     radius = float(np.mean(np.linalg.norm(hexapod.upper_joints, axis=1)))
     if radius == 0.0:
-        raise GeometryError("upper_joints: all joints coincide with the origin of F_H")
+        raise GeometryError(
+            "hexapod.upper_joints: all joints lie in the origin of F_H; give the six places where the legs "
+            "meet the platform, in m"
+        )
+    height = float(np.mean(np.array(hexapod.upper_joints) - np.array(hexapod.lower_joints), axis=0)[2])
+    if height + hexapod.neutral[2] > 0.0:
+        raise GeometryError(
+            f"hexapod.neutral: with z = {hexapod.neutral[2]:g} the platform lies below its base; z points "
+            "down, so give a negative number"
+        )
     scaled = neutral_jacobian(hexapod) / np.array([1.0, 1.0, 1.0, radius, radius, radius])
     values = np.linalg.svd(scaled, compute_uv=False)
     if not values[-1] > _LEAST_CONDITION * values[0]:

@@ -202,8 +202,11 @@ def load_platform(path: str | Path) -> Platform:
 
     Raises:
         DataError: the file cannot be read.
-        ConfigurationError: a field is wrong, or (GeometryError) the hexapod is singular at neutral.
+        ConfigurationError: a field is wrong, or (GeometryError) the hexapod holds no platform at neutral.
     """
     platform = load(Platform, path)
-    check_geometry(platform.hexapod)
+    try:
+        check_geometry(platform.hexapod)
+    except GeometryError as error:
+        raise GeometryError(f"{path}: {error}") from None
     return platform

@@ -70,7 +70,7 @@ def test_what_is_unknown_or_of_another_family_is_refused(tmp_path):
     with pytest.raises(ConfigurationError, match="is a set of the classical washout; give one of the"):
         load_of("optimal", "classical")
     (tmp_path / "odd.yaml").write_text("name: x\nalgorithm: adaptve\n")
-    with pytest.raises(UnknownNameError, match="unknown algorithm 'adaptve'"):
+    with pytest.raises(ConfigurationError, match=r"odd\.yaml: field 'algorithm' is 'adaptve'; it is one of"):
         load_parameters(tmp_path / "odd.yaml")
     (tmp_path / "mixed.yaml").write_text("name: x\nadaptation: {}\n")
     with pytest.raises(ConfigurationError, match="unknown field 'adaptation'"):

@@ -196,11 +196,15 @@ def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path)
     with pytest.raises(DataError, match="does not fit"):
         search().resume(broken)
     path.write_text("{")
-    with pytest.raises(DataError, match="no search can be read"):
+    with pytest.raises(DataError, match=r"no search can be read .*delete it, or name another --out"):
         load_record(path)
     path.write_text('{"options": 3}')
-    with pytest.raises(ConfigurationError, match="options"):
+    with pytest.raises(DataError, match=r"\(field 'options'.*, and 3 more\); begin anew: delete it") as told:
         load_record(path)
+    assert len(str(told.value).removeprefix(str(path))) < 250
+    for changed in (replace(record.options, seed=9), replace(record.options, limits="all")):
+        with pytest.raises(DataError, match="options, drives, machine"):
+            Search(changed, Objective(DRIVES, get_platform("paper"))).resume(record)
 
 
 def wider(coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:

@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from scipy import signal
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy, make_policy
 from motion_cueing.baselines.families import family_presets
+from motion_cueing.baselines.optimal_washout import load_optimal
 from motion_cueing.baselines.washout import (
     HighPass,
     LowPass,
@@ -24,7 +26,7 @@ from motion_cueing.baselines.washout.step import Memory
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.settings import load, save
+from motion_cueing.envs.settings import load, save, to_dict
 from motion_cueing.evaluation import rollout
 
 from .drives import boundless, trace
@@ -259,7 +261,6 @@ def test_a_policy_from_a_file(tmp_path):
         ("name: x\nforce_limit: [-1, 1, 1]", "force_limit.0"),
         ("name: x\nrate_bandwidth: 1.0e+6", "rate_bandwidth"),
         ("name: x\nfollow_frequency: 1000", "follow_frequency"),
-        ("description: x", "'name' is missing"),
         ("- 1", "expected fields"),
     ],
 )
@@ -268,6 +269,32 @@ def test_broken_files_say_which_field(text, told, tmp_path):
     with pytest.raises(ConfigurationError) as error:
         load_washout(tmp_path / "bad.yaml")
     assert told in str(error.value)
+
+
+def test_a_name_and_a_description_may_stand_in_any_file_or_not(tmp_path):
+    platform = get_platform("paper")
+    for algorithm in ("classical", "adaptive", "optimal", "mpc"):
+        path = tmp_path / f"my-{algorithm}.yaml"
+        path.write_text(f"algorithm: {algorithm}\n")
+        if algorithm == "optimal":
+            path.write_text(yaml.safe_dump(unnamed(load_optimal("optimal-washout"))))
+        assert make_policy(path, platform).name == f"my-{algorithm}"
+        path.write_text(path.read_text() + "name: other\ndescription: of mine\n")
+        assert make_policy(path, platform).name in ("other", "my-mpc")
+
+
+def unnamed(parameters):
+    """Values of a file without name and description."""
+    return {key: value for key, value in to_dict(parameters).items() if key not in ("name", "description")}
+
+
+def test_an_algorithm_that_nobody_knows_is_named_with_its_file(tmp_path):
+    (tmp_path / "algo.yaml").write_text("algorithm: foo\n")
+    known = "classical, adaptive, optimal, mpc, nmpc"
+    with pytest.raises(
+        ConfigurationError, match=f"algo.yaml: field 'algorithm' is 'foo'; it is one of {known}"
+    ):
+        make_policy(tmp_path / "algo.yaml", get_platform("paper"))
 
 
 def test_unknown_names_and_broken_observations():

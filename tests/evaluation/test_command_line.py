@@ -7,22 +7,29 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motion_cueing.baselines.washout import load_washout
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import MotionCueingError
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import save, to_dict
 from motion_cueing.evaluation import evaluate_command
 from motion_cueing.evaluation.__main__ import with_default
 from motion_cueing.evaluation.command_line import COMMANDS, main
 from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line
 from motion_cueing.evaluation.file_names import file_names
+from motion_cueing.evaluation.policies import policy_names
 from motion_cueing.evaluation.results import Results
-from motion_cueing.evaluation.selection import find_maneuvers
+from motion_cueing.evaluation.selection import find_maneuvers, find_policies
+from motion_cueing.evaluation.suite import labels
 from motion_cueing.evaluation.trajectory import Trajectory
 
 from .synthetic import drive
@@ -116,10 +123,114 @@ def test_an_interrupt_ends_with_130(simulator, cue_file, tmp_path, monkeypatch, 
     assert said == "motion-cueing evaluate: interrupted"
 
 
-def test_a_folder_that_cannot_be_made_is_a_failure(simulator, cue_file, tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    said = complaint(capsys, ["evaluate", "--maneuver", cue_file, "--out", tmp_path / "file" / "deep"], 1)
-    assert "file" in said
+@pytest.mark.parametrize("name", ["compare", "robustness", "demonstrate"])
+def test_after_an_interrupt_the_same_command_goes_on(name, monkeypatch, capsys):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    module = import_module(COMMANDS[name].module, "motion_cueing.evaluation")
+    monkeypatch.setattr(module, "run", interrupt)
+    done = "interrupted; drives that are done are kept, and the same command"
+    assert complaint(capsys, [name], 130) == f"motion-cueing {name}: {done} goes on"
+    if name != "demonstrate":
+        assert complaint(capsys, [name, "--fresh"], 130).endswith(f"{done} without --fresh goes on")
+
+
+PRESSED = """
+import sys
+class Pressed:
+    def find_spec(self, name, path=None, target=None):
+        if name == "motion_cueing.evaluation.criteria":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Pressed())
+sys.argv[0] = sys.argv[1]
+import motion_cueing.evaluation
+"""
+
+
+def test_an_interrupt_while_libraries_load_ends_the_command_line_and_no_other_program():
+    def load(program):
+        return subprocess.run([sys.executable, "-c", PRESSED, program], capture_output=True, text=True)
+
+    for program in ("/usr/bin/motion-cueing", "-m"):
+        ended = load(program)
+        assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
+    assert "KeyboardInterrupt" in load("mine.py").stderr
+
+
+WRITE = {
+    "evaluate": [],
+    "frequency-response": ["--policy", "no-motion"],
+    "compare": ["--policies", "no-motion"],
+    "robustness": ["--policies", "no-motion"],
+    "demonstrate": ["--policy", "no-motion", "--random", "1"],
+    "train": ["--algo", "ppo"],
+    "tune": ["classical"],
+    "export": ["--policy", "learned-preview"],
+    "render": [],
+    "import": ["log.csv", "--column", "time=t"],
+    "curves": ["run-1"],
+}
+"""What each command that writes needs beside its output."""
+FILES = {"tune": "x.yaml", "export": "x.onnx", "render": "x.png", "import": "x.csv", "curves": "x.png"}
+
+
+@pytest.mark.parametrize("name", WRITE)
+def test_where_nothing_can_be_written_is_told_before_the_work(name, tmp_path, monkeypatch, capsys):
+    def denied(folder):
+        raise PermissionError(13, "Permission denied", str(folder))
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "afile").write_text("mine")
+    option = "--onnx" if name == "export" else "--out"
+    below = f"afile/{FILES.get(name, 'deep')}"
+    assert "afile is a file; name a folder" in complaint(capsys, [name, *WRITE[name], option, below])
+    with monkeypatch.context() as locked:
+        locked.setattr("motion_cueing.envs.targets.probe", denied)
+        there = FILES.get(name, "deep")
+        said = complaint(capsys, [name, *WRITE[name], option, there])
+        assert f"{option} {there} cannot be written (Permission denied); name another folder" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["afile"]
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("evaluate", "results.json"),
+        ("frequency-response", "frequency-response.json"),
+        ("compare", "study.json"),
+        ("robustness", "study.json"),
+    ],
+)
+@pytest.mark.parametrize("content", ["hello", "[]", '{"schema": 1}'])
+def test_the_files_of_others_are_not_replaced(name, file, content, tmp_path, capsys):
+    (tmp_path / file).write_text(content)
+    said = complaint(capsys, [name, *WRITE[name], "--out", tmp_path])
+    assert f"{tmp_path / file} was not written by this command; move it away, or name another --out" in said
+    assert (tmp_path / file).read_text() == content
+
+
+def test_a_file_is_not_labelled_as_the_policy_that_ships():
+    names = ["my/classical-tuned.yaml", "classical-tuned", "your/classical-tuned.yml", "mine.yaml"]
+    stems = [name.rpartition("/")[2].partition(".")[0] for name in names]
+    assert list(labels(names, stems, policy_names()).values()) == [
+        "classical-tuned-2",
+        "classical-tuned",
+        "classical-tuned-3",
+        "mine",
+    ]
+    assert labels(["classical-tuned.yaml"], ["classical-tuned"], policy_names()) == {
+        "classical-tuned.yaml": "classical-tuned-2"
+    }
+
+
+def test_the_share_refers_to_the_policy_that_ships(tmp_path):
+    mine = tmp_path / "classical-tuned.yaml"
+    save(load_washout("classical"), mine)
+    assert find_policies([str(mine), "optimum"], get_platform("paper")) == {
+        "classical-tuned-2": str(mine),
+        "optimum": "optimum",
+    }
 
 
 IMPORT = ("import", "log.csv", "--column", "time=t", "--out", "cues.csv")
@@ -225,8 +336,19 @@ HEADER = (
         ("", "empty"),
         (HEADER, "empty"),
         ("time_s,specific_force_x_m_s2\n0,1\n1,2\n", "missing column specific_force_y_m_s2"),
-        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,nan,0,-9.81,0,0,0\n", "specific_force is not finite at sample 1"),
-        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0,inf,0,0,0\n", "specific_force is not finite at sample 1"),
+        (
+            HEADER + "0,0,0,-9.81,0,0,0\n0.1,nan,0,-9.81,0,0,0\n",
+            "line 3, column specific_force_x_m_s2: not a",
+        ),
+        (HEADER + "0,0,0,-9.81,0,0,0\n\n0.1,0,0,inf,0,0,0\n", "line 4, column specific_force_z_m_s2: not a"),
+        (
+            HEADER + "0,0,0,-9.81,0,0,0\n0.1,1e9,0,0,0,0,0\n",
+            "x_m_s2: 1e+09 is beyond 1000 m/s^2, which no car",
+        ),
+        (
+            HEADER + "0,0,0,-9.81,0,-300,0\n0.1,0,0,0,0,0,0\n",
+            "line 2, column angular_velocity_y_rad_s: -300 is",
+        ),
         (HEADER + "0.1,0,0,-9.81,0,0,0\n0,0,0,-9.81,0,0,0\n", "time does not increase at sample 1"),
         (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0\n", "line 3 has 3 cells"),
         (HEADER + "0,0,0,-9.81,0,0,0\n0.1,x,0,-9.81,0,0,0\n", "could not convert string to float"),
@@ -241,12 +363,28 @@ def test_bad_cues_exit_2_before_anything_is_driven(content, told, tmp_path, caps
     assert not (tmp_path / "out").exists()
 
 
+def upside_down():
+    """The paper's machine with a height whose sign is wrong."""
+    values = to_dict(get_platform("paper"))
+    values["hexapod"]["neutral"][2] *= -1.0
+    return yaml.safe_dump(values)
+
+
+def coinciding():
+    """The paper's machine with a platform that is a point."""
+    values = to_dict(get_platform("paper"))
+    values["hexapod"]["upper_joints"] = [[0.0, 0.0, 0.0]] * 6
+    return yaml.safe_dump(values)
+
+
 @pytest.mark.parametrize(
     ("content", "told"),
     [
         ("name: x\ndescription: y\nhexapd: {}\n", "unknown field 'hexapd'. Did you mean hexapod?"),
         ("name: [", "not YAML"),
         ("- 1\n", "expected fields of Platform"),
+        (upside_down(), "machine.yaml: hexapod.neutral: with z = 2.4396 the platform lies below its base"),
+        (coinciding(), "machine.yaml: hexapod.upper_joints: all joints lie in the origin of F_H; give"),
     ],
 )
 def test_bad_platform_files_exit_2(content, told, tmp_path, capsys):
@@ -270,7 +408,10 @@ def test_list_shows_every_kind(capsys):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help(name, capsys):
     assert main([name, "--help"]) == 0
-    assert f"usage: motion-cueing {name}" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert f"usage: motion-cueing {name}" in shown
+    assert "None" not in shown
+    assert "(default: )" not in shown
 
 
 def test_overview_and_version(capsys):

@@ -53,12 +53,14 @@ def test_a_recording_is_what_happened(folder):
     assert np.allclose(read(drive.observation, "wanted_rate"), cues.angular_velocity[:-1], atol=1e-12)
 
 
-def test_the_optimum_demonstrates(folder, tmp_path):
+def test_the_optimum_demonstrates(folder, tmp_path, capsys):
     surge(1.0, 1.0).to_csv(tmp_path / "surge.csv")
     assert record("--maneuver", "surge.csv") == 0
+    told = capsys.readouterr().out
     (entry,) = load_index(folder).drives
     assert entry.name == "surge"
     assert entry.cue_error < 0.01
+    assert float(told.split("mean J ")[1]) == pytest.approx(entry.cue_error, rel=0.01)
     assert entry.at_limit == 0.0
     assert entry.notes["optimum_unconverged"] == "0"
     assert load_index(folder).setting["policy"] == "optimum"
@@ -172,6 +174,14 @@ def test_wrong_arguments_are_refused(folder, capsys, words, told):
     assert record(*words) == 2
     assert told in capsys.readouterr().err
     assert not folder.exists()
+
+
+def test_another_ones_index_is_not_replaced(folder, capsys):
+    folder.mkdir()
+    (folder / "index.json").write_text("hello")
+    assert record(*WASHOUT, "--random", "1") == 2
+    assert "not JSON" in capsys.readouterr().err
+    assert (folder / "index.json").read_text() == "hello"
 
 
 def test_broken_recordings_are_refused(folder):

@@ -119,11 +119,11 @@ def test_a_wrong_option_is_told_in_one_plain_line(
     [
         ("--plot", "plot.jpg", "does not end in .png"),
         ("--plot", "plot", "does not end in .png"),
-        ("--plot", "file/plot.png", "cannot be written (Not a directory)"),
-        ("--plot", "file/deeper/plot.png", "cannot be written (Not a directory)"),
+        ("--plot", "file/plot.png", "is a file; name a folder"),
+        ("--plot", "file/deeper/plot.png", "is a file; name a folder"),
         ("--plot", "folder.png", "is a folder"),
         ("--plot", "log.png", "is the log or the cues"),
-        ("--out", "file/cues.csv", "cannot be written (Not a directory)"),
+        ("--out", "file/cues.csv", "is a file; name a folder"),
         ("--out", "folder.png", "is a folder"),
     ],
 )
@@ -137,21 +137,23 @@ def test_targets_that_cannot_be_written_are_refused_first(
     paths = {"--out": tmp_path / "cues.csv", "--plot": tmp_path / "plot.png"} | {option: tmp_path / target}
     targets = [word for name, path in paths.items() for word in (name, str(path))]
     assert main(["import", str(tmp_path / "log.png"), "--column", *TEXTS, *targets]) == 2
-    assert f"{option[2:]}: {tmp_path / target} {message}" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"{option} {tmp_path / target}" in said
+    assert message in said
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_folder_without_permission_is_refused_first(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def denied(dir: Path) -> None:
-        if dir.name == "locked":
-            raise PermissionError(13, "Permission denied", str(dir / "tmpname"))
+    def denied(folder: Path) -> None:
+        if folder.name == "locked":
+            raise PermissionError(13, "Permission denied", str(folder / "tmpname"))
 
     (tmp_path / "locked").mkdir()
-    monkeypatch.setattr("motion_cueing.evaluation.import_command.probe", denied)
+    monkeypatch.setattr("motion_cueing.envs.targets.probe", denied)
     arguments = [str(log), "--column", *TEXTS, "--out", str(tmp_path / "cues.csv")]
-    with pytest.raises(ConfigurationError, match=r"plot: .*locked/plot.png cannot be written \(Permission"):
+    with pytest.raises(DataError, match=r"--plot .*locked/plot.png cannot be written \(Permission"):
         run(parsed(*arguments, "--plot", str(tmp_path / "locked" / "plot.png")))
     assert not (tmp_path / "cues.csv").exists()
 

@@ -52,6 +52,14 @@ def test_compare_writes_everything_and_goes_on(cue_file, tmp_path, capsys):
     assert sorted(results.command.split()) == sorted(["motion-cueing", *argv])
     assert main(argv) == 0
     assert "0 of 10 drives driven now" in capsys.readouterr().out
+    first, second = sorted((out / "pairs").iterdir())[:2]
+    first.write_text("{")
+    values = json.loads(second.read_text())
+    values["drives"]["bend"]["metrics"] = dict.fromkeys(values["drives"]["bend"]["metrics"], "wrong")
+    second.write_text(json.dumps(values))
+    assert main(argv) == 2
+    damaged = f"{first}, {second}: damaged, not the drives of a study; delete them, or add --fresh"
+    assert capsys.readouterr().err == f"motion-cueing compare: {damaged}\n"
     assert main([*argv, "--fresh"]) == 0
     assert "10 of 10 drives driven now" in capsys.readouterr().out
 

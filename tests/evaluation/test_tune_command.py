@@ -46,10 +46,13 @@ def test_what_it_writes_is_a_policy_and_says_how_it_was_made(words, tmp_path, ca
         assert f"# {line.strip()}\n" in text
     start, tuned = (float(found) for found in re.findall(r"J ([\d.]+), perceived", text))
     assert 0.0 < tuned < start
+    found = load_record(tmp_path / "mine.search.json").found
+    hours = sum(step.hours for step in found)
+    assert f"# {hours:.3g} h simulated in {len(found)} steps (budget 0.0466667 h, and what was begun" in text
     policy = make_policy(tmp_path / "mine.yaml", get_platform("paper"))
     assert policy.name == "mine"
     assert load_washout(tmp_path / "mine.yaml").description == (
-        "classical at its best: tuned by CMA-ES for J on weave.csv"
+        f"classical tuned with {hours:.3g} h by CMA-ES for J on weave.csv"
     )
 
 
@@ -58,8 +61,8 @@ def test_random_drives_are_the_default_and_others_are_held_out(tmp_path, monkeyp
     assert main(["tune", "classical", "--drives", "1", "--budget", "0.001", "--objective", "perceived"]) == 0
     told = capsys.readouterr().out
     assert "on the 1 random drives of the search: classical J" in told
-    assert "on 64 random drives held out: classical-tuned J" in told
-    record = load_record(tmp_path / "classical-tuned.search.json")
+    assert "on 64 random drives held out: my-classical J" in told
+    record = load_record(tmp_path / "my-classical.search.json")
     assert (record.options.maneuvers, record.options.objective) == (("train",), "perceived")
 
 
@@ -119,6 +122,7 @@ class PressedLater(Interrupt):
         (["--resume"], "no search can be read"),
         (["--resume", "--seed", "3"], "--seed was chosen when the search was begun"),
         (["--objective", "K"], "K"),
+        (["--maneuvers", "braking", "--drives", "4"], "--drives counts random drives; leave it out"),
     ],
 )
 def test_wrong_arguments_are_named(more, told, tmp_path, monkeypatch, capsys):
@@ -138,19 +142,27 @@ def test_unknown_algorithms_and_searches_that_are_there_already_are_refused(word
     assert "go on with --resume, or name another --out" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("content", ["hello", "name: mine\ndescription: by hand\n"])
+def test_a_file_that_no_search_made_is_not_replaced(content, words, tmp_path, capsys):
+    (tmp_path / "mine.yaml").write_text(content)
+    assert main(words) == 2
+    assert "mine.yaml was not written by this command; move it away" in capsys.readouterr().err
+    assert (tmp_path / "mine.yaml").read_text() == content
+
+
 @pytest.mark.parametrize(("algorithm", "start"), [("adaptive", "adaptive"), ("optimal", "optimal-washout")])
 def test_every_family_is_tuned_the_same_way(algorithm, start, words, tmp_path, capsys):
     words = ["tune", algorithm, *words[2:4], "--budget", str(15 * 6 * 2.0 / HOUR)]
     assert main(words) == 0
-    found = load_parameters(tmp_path / f"{start}-tuned.yaml")
-    assert (algorithm_of(found), found.name) == (algorithm, f"{start}-tuned")
+    found = load_parameters(tmp_path / f"my-{start}.yaml")
+    assert (algorithm_of(found), found.name) == (algorithm, f"my-{start}")
     before, after = (float(cost) for cost in re.findall(r"J ([\d.]+), perceived", capsys.readouterr().out))
     assert 0.0 < after < before
-    kept = load_record(tmp_path / f"{start}-tuned.search.json")
+    kept = load_record(tmp_path / f"my-{start}.search.json")
     assert kept.options.start == load_parameters(start)
     # It goes on as the search of that algorithm alone.
     assert main(["tune", algorithm, "--resume"]) == 0
-    out = ["--out", f"{start}-tuned.yaml"]
+    out = ["--out", f"my-{start}.yaml"]
     assert main(["tune", "classical", "--resume", *out]) == 2
     assert (
         f"is a search of {algorithm}; go on with: motion-cueing tune {algorithm}" in capsys.readouterr().err
