@@ -5,13 +5,13 @@ car's specific force (the observation's memory), and the acceleration a of the a
 
     carriage   a <- (1 - leak) a + force_gain (f_car - f)
                     + (leak + force_gain) (sum_j c_j f_j - 2 D w xdot - w^2 x)
-    heave      a <- (1 - leak) a + heave_gain (f_car - f) - (leak + heave_gain) (2 w_0 zdot + w_0^2 z)
+    hexapod    the same without c_j, with gains of its own for surge and sway, and for heave
     pitch      a <- rate_gain (omega_car - omega) + stiffness ((t_0 f_car + sum_j t_j f_j) / g - theta)
     roll       the same with -f_y
     turntable  a <- yaw_gain (omega_car - omega)
 
-The rest is led back to neutral by w_0, critically damped. It high-passes what the carriage can follow and
-tilts for what lasts, as any washout, and corrects itself by what is felt.
+The hexapod's yaw is led back to neutral, critically damped. It high-passes what carriage and hexapod can
+follow and tilts for what lasts, as any washout, and corrects itself by what is felt.
 """
 
 from __future__ import annotations
@@ -38,11 +38,13 @@ _POSITIVE: Final = (
     "carriage_damping",
     "leak",
     "force_gain",
+    "hexapod_frequency",
+    "hexapod_gain",
+    "heave_frequency",
     "heave_gain",
     "rate_gain",
     "stiffness",
     "yaw_gain",
-    "neutral_frequency",
 )
 _CUES: Final = 6
 """Entries of the memory a time constant: specific force, angular velocity."""
@@ -55,13 +57,15 @@ class LinearWashout:
     Args:
         carriage_frequency: w of the carriage's way back, rad/s.
         carriage_damping: D of it.
-        leak: Share of the last acceleration of carriage and heave that is given up at each action.
-        force_gain: Share of the horizontal force's error that is made up for at each action.
-        heave_gain: The same of the vertical one's.
+        leak: Share of the last acceleration of carriage and hexapod that is given up at each action.
+        force_gain: Share of the horizontal force's error that the carriage makes up for at each action.
+        hexapod_frequency: w of the hexapod's way back from surge, sway and yaw, rad/s.
+        hexapod_gain: Share of the horizontal force's error that the hexapod makes up for.
+        heave_frequency: w of its way back from heave, rad/s.
+        heave_gain: Share of the vertical force's error.
         rate_gain: From the error of roll and pitch rate to tilt acceleration, 1/s.
         stiffness: From the error of the tilt angle to tilt acceleration, 1/s^2.
         yaw_gain: From the error of the yaw rate to the turntable's acceleration, 1/s.
-        neutral_frequency: w_0 of what is led back to neutral, rad/s.
         carriage_shares: c_j, one for each time constant of the memory.
         tilt_share: t_0.
         tilt_shares: t_j.
@@ -71,11 +75,13 @@ class LinearWashout:
     carriage_damping: Positive = 1.0
     leak: Positive = 0.1
     force_gain: Positive = 0.2
+    hexapod_frequency: Positive = 2.0
+    hexapod_gain: Positive = 0.05
+    heave_frequency: Positive = 1.0
     heave_gain: Positive = 0.1
     rate_gain: Positive = 15.0
     stiffness: Positive = 5.0
     yaw_gain: Positive = 15.0
-    neutral_frequency: Positive = 1.0
     carriage_shares: tuple[float, ...] = ()
     tilt_share: float = 0.0
     tilt_shares: tuple[float, ...] = ()
@@ -169,13 +175,14 @@ class _Writer:
             self._remember(axis, k, w.carriage_shares, lead)
 
     def _hexapod(self, w: LinearWashout) -> None:
-        lead = w.leak + w.heave_gain
-        self._keep(HEAVE, 1.0 - w.leak)
-        self._add(HEAVE, "force_error", 2, w.heave_gain)
         for k, axis in enumerate(HEXAPOD):
-            strength = lead if axis == HEAVE else 1.0
-            self._spring(axis, "displacement", "velocity", k, w.neutral_frequency, 1.0, strength)
-        self._spring(YAW, "beta", "beta_rate", 2, w.neutral_frequency, 1.0, 1.0)
+            heave = axis == HEAVE
+            gain = w.heave_gain if heave else w.hexapod_gain
+            frequency = w.heave_frequency if heave else w.hexapod_frequency
+            self._keep(axis, 1.0 - w.leak)
+            self._add(axis, "force_error", k, gain)
+            self._spring(axis, "displacement", "velocity", k, frequency, 1.0, w.leak + gain)
+        self._spring(YAW, "beta", "beta_rate", 2, w.hexapod_frequency, 1.0, 1.0)
 
     def _tilt(self, w: LinearWashout) -> None:
         for k, axis in enumerate(TILT):
