@@ -38,7 +38,7 @@ def response_table(response: FrequencyResponse) -> TextTable:
         rows.append(
             (f"{name}, modulus{unit(moved, felt)}", *(number(value) if value else "0" for value in modulus))
         )
-        phases = (f"{np.degrees(np.angle(value)):.0f}" if value else NOTHING for value in values)
+        phases = (f"{round(np.degrees(np.angle(value)))}" if value else NOTHING for value in values)
         rows.append((f"{name}, phase deg", *phases))
     header = ("rad/s", *(f"{frequency:.3g}" for frequency in response.test.frequencies))
     title = f"{response.policy} on {response.platform}, {amplitudes(response.test.scale)}"

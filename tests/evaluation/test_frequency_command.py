@@ -112,6 +112,11 @@ def test_figures_say_what_was_not_measured_and_what_gives_nothing(monkeypatch):
         assert labels == ["no-motion: nothing comes through", "mine"]
 
 
+def test_a_phase_of_almost_nothing_has_no_sign():
+    row = response_table(response("mine", 1.0, -1e-3)).rows[1]
+    assert row[1:] == ("0", "0")
+
+
 def test_titles_say_how_large_the_inputs_are():
     assert amplitudes(1.0) == "the test's amplitudes"
     assert amplitudes(0.01) == "0.01 of the test's amplitudes"
