@@ -62,7 +62,8 @@ def run_and_save(
     results = results_of(conditions, list(policies), outcome, words)
     results.save_json(out / "study.json")
     results.save_csv(out / "study.csv")
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results))
+    left_out = [f"Left out: {line}" for line in results.told_left_out()]
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results), *left_out)
     image = figure(results)
     if image is not None:
         write_bytes(out / "study.png", image)

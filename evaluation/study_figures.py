@@ -76,9 +76,9 @@ def _shares(axes: Axes, results: StudyResults, perceived: bool) -> None:
 
 def _lines(axes: Axes, results: StudyResults, value: Callable[[Summary], float | None], floor: float) -> None:
     """A line a policy; values below the floor lie on it, marked with a triangle that points down."""
-    styles = line_styles(results.policies)
+    styles = line_styles(results.driven)
     below = False
-    for policy in results.policies:
+    for policy in results.driven:
         found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
         told = [None if summary is None else value(summary) for summary in found]
         values = np.array([math.nan if v is None else v for v in told])
@@ -100,7 +100,7 @@ def heat_figure(results: StudyResults) -> bytes | None:
     """
     if not results.summaries:
         return None
-    policies, names = list(results.policies), list(results.conditions)
+    policies, names = list(results.driven), list(results.conditions)
     with styled():
         figure = new_figure(2.6 + 1.5 * len(names), 1.9 + 0.5 * len(policies))
         axes = figure.subplots()
@@ -129,7 +129,7 @@ def _ratios(results: StudyResults) -> NDArray[np.float64]:
     """(policies, conditions) J over that under the first condition; NaN where there is none."""
     rows = [
         [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
-        for policy in results.policies
+        for policy in results.driven
     ]
     return np.array([[math.nan if s is None or not s.ratio else s.ratio for s in row] for row in rows])
 

@@ -95,6 +95,23 @@ class StudyResults:
     notes: dict[str, dict[str, dict[str, dict[str, str]]]]
     criteria: Criteria
 
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Policies with a result under any condition; the rest was left out or failed everywhere."""
+        found = {policy for policies in self.summaries.values() for policy in policies}
+        return tuple(policy for policy in self.policies if policy in found)
+
+    def told_left_out(self) -> list[str]:
+        """A line for each policy and reason why it was left out, with the conditions where not under all."""
+        reasons: dict[tuple[str, str], list[str]] = {}
+        for condition, policies in self.left_out.items():
+            for policy, reason in policies.items():
+                reasons.setdefault((policy, reason), []).append(condition)
+        return [
+            f"{policy}{'' if len(under) == len(self.conditions) else ', ' + ', '.join(under)}: {reason}"
+            for (policy, reason), under in reasons.items()
+        ]
+
     def save_json(self, path: str | Path) -> None:
         """Write ``study.json``, whole or not at all."""
         save_json(self, path)

@@ -14,7 +14,7 @@ from .words import how_many
 
 
 def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
-    """J of every policy under every condition.
+    """J of every policy that was driven under every condition.
 
     Args:
         results: The study.
@@ -22,7 +22,7 @@ def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
         ratios: Whether J over that under the first condition stands beside it.
     """
     rows = []
-    for policy in results.policies:
+    for policy in results.driven:
         cells = [_cell(results, condition, policy, ratios) for condition in results.conditions]
         rows.append((policy, *cells))
     about = f"{title}: J, mean over {how_many(len(results.maneuvers), 'drive')}"
@@ -51,7 +51,7 @@ def share_tables(results: StudyResults) -> list[TextTable]:
 
 def _share_table(results: StudyResults, title: str, perceived: bool) -> TextTable:
     rows = []
-    for policy in results.policies:
+    for policy in results.driven:
         found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
         shares = [None if s is None else s.perceived_share if perceived else s.share for s in found]
         rows.append((policy, *(fraction(share) for share in shares)))
@@ -107,10 +107,8 @@ def print_study(console: Console, results: StudyResults, title: str, ratios: boo
         for maneuver, found in drives.items()
     ]
     print_troubles(console, counted)
-    for condition, policies in results.left_out.items():
-        for policy, reason in policies.items():
-            who = f"{escape(policy)}, {escape(condition)}"
-            console.print(f"[bold]left out[/bold] {who}: {escape(reason)}", highlight=False)
+    for line in results.told_left_out():
+        console.print(f"[bold]left out[/bold] {escape(line)}", highlight=False)
     for failure in results.failures:
         who = ", ".join(part for part in (failure.condition, failure.policy, failure.maneuver) if part)
         console.print(

@@ -159,7 +159,11 @@ def test_left_out_and_failed_are_told_and_the_others_stay(roll, tmp_path):
     # Means are over what every policy finished.
     assert results.maneuvers == ("bend",)
     assert set(results.summaries["paper"]) == {"no-motion", "classical-tuned", "mine"}
-    assert matrix_table(results, "t", False).rows[-1] == ("optimum", "left out")
+    assert results.driven == tuple(row[0] for row in matrix_table(results, "t", False).rows)
+    assert set(results.driven) == {"no-motion", "classical-tuned", "mine"}
+    assert results.told_left_out() == ["optimum: needs a solver"]
+    partly = replace(results, conditions={**results.conditions, "other": "another machine"})
+    assert partly.told_left_out() == ["optimum, paper: needs a solver"]
 
 
 def test_every_drive_is_counted_done_failed_and_left_out(roll, tmp_path):
