@@ -72,6 +72,8 @@ def _shares(axes: Axes, results: StudyResults, perceived: bool) -> None:
     axes.set_ylim(LOWEST_SHARE - 0.1, 1.25)
     about = "Perceived share of the gap" if perceived else "Share of the gap"
     axes.set_title(f"{about}: 0 tuned washout, 1 optimum")
+    if not any(np.isfinite(line.get_ydata(orig=False)).any() for line in axes.get_lines()[:-2]):
+        axes.text(0.5, 0.4, "its optimum is not among the policies", transform=axes.transAxes, ha="center")
 
 
 def _lines(axes: Axes, results: StudyResults, value: Callable[[Summary], float | None], floor: float) -> None:
