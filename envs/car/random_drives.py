@@ -40,6 +40,7 @@ class RandomDrives:
         highway: Of highway drives.
         track: Of fierce drives on a handling track.
         hilly: Of drives over steep hills and crests.
+        strip: Of drives with standing starts and full braking, far along a straight.
         cars: Cars to draw from, by name.
     """
 
@@ -48,6 +49,7 @@ class RandomDrives:
     highway: NonNegative = 0.2
     track: NonNegative = 0.0
     hilly: NonNegative = 0.0
+    strip: NonNegative = 0.0
     cars: Annotated[tuple[str, ...], Field(min_length=1)] = ("sedan",)
 
     def __post_init__(self) -> None:
@@ -93,7 +95,7 @@ def random_drive(
     Args:
         seed: The same seed gives the same drive.
         duration: 0.1 s to a day, s.
-        kind: "urban", "rural", "highway", "track" or "hilly"; drawn if None.
+        kind: "urban", "rural", "highway", "track", "hilly" or "strip"; drawn if None.
         car: Drawn from ``drives.cars`` if None.
         drives: What to draw from.
 

@@ -124,9 +124,24 @@ KINDS: Final = {
         waves=((150.0, 300.0), (300.0, 700.0)),
         events={"bend": 2, "slow": 1, "lane_change": 1},
     ),
+    "strip": RoadKind(
+        speed=(80 * KMH, 150 * KMH),
+        accelerate=(2.0, 4.5),
+        brake=(3.0, 7.0),
+        lateral=(1.5, 2.5),
+        straight=(50.0, 500.0),
+        radius=(300.0, 600.0),
+        angle=(0.1, 0.4),
+        transition=(30.0, 60.0),
+        lane_change=(4.5, 8.0),
+        grade=(0.0, 0.01),
+        waves=ROLLING,
+        events={"stop": 4, "slow": 3, "bend": 1},
+    ),
 }
 """Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers; on the
-handling track those of a test driver, in the hills slopes and crests of mountain roads."""
+handling track those of a test driver, in the hills slopes and crests of mountain roads, on the strip standing
+starts and full braking."""
 
 CORNER_RADIUS: Final[Range] = (9.0, 18.0)
 """Of a right-angled turn at a crossing, m."""

@@ -10,7 +10,7 @@ from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 
 ROADS = ("urban", "rural", "highway")
-KINDS = (*ROADS, "track", "hilly")
+KINDS = (*ROADS, "track", "hilly", "strip")
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +52,7 @@ def test_each_begins_calm_and_lasts_as_long_as_asked(batches, kind):
         ("highway", 2.2, 2.3),
         ("track", 7.5, 7.0),
         ("hilly", 3.2, 4.0),
+        ("strip", 4.5, 8.0),
     ],
 )
 def test_accelerations_are_those_of_drivers(batches, kind, side, along):
@@ -60,7 +61,7 @@ def test_accelerations_are_those_of_drivers(batches, kind, side, along):
     assert 0.4 * side < np.abs(force[:, 1]).max() < side
     assert 0.3 * along < np.abs(force[:, 0]).max() < along
     assert speed.min() > -0.2
-    assert speed.max() < 38.0
+    assert speed.max() < (44.0 if kind == "strip" else 38.0)
 
 
 def test_urban_drives_are_livelier_than_highway_ones(batches):
@@ -106,6 +107,17 @@ def test_the_hills_are_steeper_than_any_other_road(batches):
         return np.concatenate([trace.specific_force[:, 2] for trace in batches[kind]]).std()
 
     assert spread("hilly") > 3.0 * max(spread(kind) for kind in (*ROADS, "track"))
+
+
+def test_the_strip_holds_longer_what_it_accelerates(batches):
+    """Shares of time with much along the road: standing starts and full braking from high speed."""
+
+    def share(kind):
+        return np.mean(np.abs(np.concatenate([trace.specific_force[:, 0] for trace in batches[kind]])) > 3.0)
+
+    offsets = [np.abs(trace.channels["path_offset_m"]).max() for trace in batches["strip"]]
+    assert max(offsets) < 1.0
+    assert share("strip") > 2.0 * max(share(kind) for kind in KINDS if kind != "strip")
 
 
 def test_kinds_follow_their_shares():
