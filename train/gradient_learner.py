@@ -14,17 +14,17 @@ import torch
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError
 from ..envs.settings import Positive, configuration, from_dict
 from ..envs.task.batch import Batch
 from ..envs.task.options import PositiveCount
 from ..envs.task.reward_kernel import TERMS
 from ..envs.task.unroll import TaskUnroll
-from .actor import ACTIVATIONS, Actor, begin_at_rest
+from .actor import ACTIVATIONS, Actor
 from .agent import Network
 from .config import TrainingConfig
-from .initial import initial_network
-from .learner import Boundary, State
+from .initial import begin
+from .learner import Boundary, State, restoring
 from .schedule import warm_cosine
 
 _TINY: Final = 1e-30
@@ -83,18 +83,11 @@ class GradientLearner:
         self._unroll = TaskUnroll(self.batch, self._length)
         size, actions = self.batch.layout.size, self.batch.action_size
         self.actor = Actor(size, actions, self.given.net_arch, self.given.activation_fn)
-        self._begin(config)
+        begin(self.actor, self.batch, config)
         self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
         self._rounds, self._skipped, self._left_out = 0, 0, 0
         self._sums: dict[str, float] = {}
         self._logged = 0
-
-    def _begin(self, config: TrainingConfig) -> None:
-        network = initial_network(config)
-        if network is None:
-            begin_at_rest(self.actor, self.batch)
-        else:
-            self.actor.load(network)
 
     @property
     def steps(self) -> int:
@@ -195,16 +188,13 @@ class GradientLearner:
 
     def restore(self, state: State) -> None:
         """Go on from a state, bit for bit."""
-        try:
+        with restoring():
             self.actor.load_state_dict(state["actor"])
             self._optimizer.load_state_dict(state["optimizer"])
             self.batch.restore(state["batch"])
             counts = (int(count) for count in state["counts"])
             self._rounds, self._skipped, self._left_out, self._logged = counts
             self._sums = dict(state["sums"])
-        except (KeyError, TypeError, ValueError, RuntimeError) as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise DataError(f"the checkpoint is of another configuration or version ({reason})") from None
 
 
 def _check(config: TrainingConfig) -> None:

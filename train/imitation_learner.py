@@ -14,15 +14,15 @@ import numpy as np
 import torch
 from pydantic import Field
 
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError
 from ..envs.settings import Positive, configuration, from_dict
 from ..envs.task.batch import Batch
 from ..envs.task.options import PositiveCount
-from .actor import ACTIVATIONS, Actor, begin_at_rest
+from .actor import ACTIVATIONS, Actor
 from .agent import Network
 from .config import TrainingConfig
-from .initial import initial_network
-from .learner import Boundary, State
+from .initial import begin
+from .learner import Boundary, State, restoring
 from .schedule import warm_cosine
 from .teacher import Teacher
 
@@ -95,20 +95,13 @@ class ImitationLearner:
         self.actor = Actor(
             self.batch.layout.size, self.batch.action_size, self.given.net_arch, self.given.activation_fn
         )
-        self._begin(config)
+        begin(self.actor, self.batch, config)
         self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
         self._order = torch.Generator().manual_seed(config.seed + _SEED_OF_ORDER)
         self._seen: list[torch.Tensor] = []
         self._told: list[torch.Tensor] = []
         self._rounds = 0
         self._last: dict[str, float] = {}
-
-    def _begin(self, config: TrainingConfig) -> None:
-        network = initial_network(config)
-        if network is None:
-            begin_at_rest(self.actor, self.batch)
-        else:
-            self.actor.load(network)
 
     @property
     def steps(self) -> int:
@@ -194,7 +187,7 @@ class ImitationLearner:
 
     def restore(self, state: State) -> None:
         """Go on from a state, bit for bit."""
-        try:
+        with restoring():
             self.actor.load_state_dict(state["actor"])
             self._optimizer.load_state_dict(state["optimizer"])
             self.batch.restore(state["batch"])
@@ -202,9 +195,6 @@ class ImitationLearner:
             self._order.set_state(state["order"])
             self._rounds = int(state["rounds"])
             self._last = dict(state["last"])
-        except (KeyError, TypeError, ValueError, RuntimeError) as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise DataError(f"the checkpoint is of another configuration or version ({reason})") from None
 
 
 def _check(config: TrainingConfig) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from ..envs.errors import ConfigurationError
+from ..envs.task.batch import Batch
+from .actor import Actor, begin_at_rest
 from .agent import Agent, Network
 from .config import TrainingConfig
 
@@ -31,3 +33,17 @@ def initial_network(config: TrainingConfig) -> Network | None:
         if theirs != ours:
             raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {ours}")
     return agent.network
+
+
+def begin(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
+    """Give an actor the weights of the initial network, or let it begin at rest where none is named.
+
+    Raises:
+        DataError: the agent's file cannot be read, or its network is built in another way.
+        ConfigurationError: that agent sees, does or drives something else.
+    """
+    network = initial_network(config)
+    if network is None:
+        begin_at_rest(actor, batch)
+    else:
+        actor.load(network)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Protocol
 
+from ..envs.errors import DataError
 from .agent import Network
 
 Boundary = Callable[[], None]
@@ -16,6 +18,20 @@ State = Mapping[str, Any]
 
 class StopTraining(Exception):  # noqa: N818  (as StopIteration, no error)
     """Ends :meth:`Learner.learn` at a boundary."""
+
+
+@contextmanager
+def restoring() -> Iterator[None]:
+    """Within :meth:`Learner.restore`: what does not fit becomes a sentence.
+
+    Raises:
+        DataError: the state is of another configuration or version.
+    """
+    try:
+        yield
+    except (IndexError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise DataError(f"the checkpoint is of another configuration or version ({reason})") from None
 
 
 class Learner(Protocol):

@@ -15,14 +15,14 @@ import torch
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError
 from ..envs.settings import Positive, configuration, from_dict
 from ..envs.task.batch import Batch
 from ..envs.task.options import PositiveCount
 from .actor import ACTIVATIONS, Actor, begin_as
 from .agent import Network
 from .config import TrainingConfig
-from .learner import Boundary, State
+from .learner import Boundary, State, restoring
 from .linear_washout import LinearWashout, coordinates, gains, washout_at
 
 Floats = NDArray[np.float64]
@@ -147,11 +147,9 @@ class LinearLearner:
 
     def restore(self, state: State) -> None:
         """Go on from a state, bit for bit."""
-        try:
+        with restoring():
             for values in state["told"]:
                 self._tell(self._search.ask(), [float(value) for value in values])
-        except (KeyError, TypeError, ValueError, IndexError) as error:
-            raise DataError(f"the checkpoint is of another configuration or version ({error})") from None
 
 
 def _check(config: TrainingConfig) -> None:

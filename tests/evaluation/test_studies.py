@@ -141,7 +141,9 @@ def test_a_broken_file_of_drives_is_told(roll, tmp_path):
         study_of(CONDITIONS, tmp_path)
 
 
-def test_left_out_and_failed_are_told_and_the_others_stay(roll, tmp_path):
+def troubled():
+    """A condition in which a policy cannot be made, one falls off the cliff, and a maneuver has no road."""
+
     def make(name):
         if name == "optimum":
             raise ConfigurationError("needs a solver")
@@ -151,7 +153,11 @@ def test_left_out_and_failed_are_told_and_the_others_stay(roll, tmp_path):
         raise DataError("no road")
 
     one = condition(maneuvers=("bend", "cliff"), make=make)
-    one = replace(one, maneuvers={**one.maneuvers, "gap": fails})
+    return replace(one, maneuvers={**one.maneuvers, "gap": fails})
+
+
+def test_left_out_and_failed_are_told_and_the_others_stay(roll, tmp_path):
+    one = troubled()
     results, _ = study_of([one], tmp_path)
     assert results.left_out == {"paper": {"optimum": "needs a solver"}}
     told = {(failure.policy, failure.maneuver): failure.message for failure in results.failures}
@@ -167,16 +173,7 @@ def test_left_out_and_failed_are_told_and_the_others_stay(roll, tmp_path):
 
 
 def test_every_drive_is_counted_done_failed_and_left_out(roll, tmp_path):
-    def make(name):
-        if name == "optimum":
-            raise ConfigurationError("needs a solver")
-        return Gain(GAINS[name])
-
-    def fails():
-        raise DataError("no road")
-
-    one = condition(maneuvers=("bend", "cliff"), make=make)
-    one = replace(one, maneuvers={**one.maneuvers, "gap": fails})
+    one = troubled()
     told = []
     for _ in range(2):
         run_study([one], POLICIES, tmp_path, lambda what, who: told.append(who))
