@@ -68,6 +68,8 @@ COMMANDS: Final[Mapping[str, Command]] = {
         goes_on=True,
     ),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
+    "serve": Command(".serve_command", "ServeCommand", "run a policy as a controller in real time, over UDP"),
+    "drive": Command(".drive_command", "DriveCommand", "send a maneuver's cues to such a controller"),
     "demonstrate": Command(
         ".demonstrate_command",
         "DemonstrateCommand",

@@ -80,7 +80,7 @@ class Driver(Protocol):
         ...
 
 
-class _Asked:
+class Asked:
     """A policy with its memory."""
 
     def __init__(self, policy: Policy | TaskPolicy, size: int) -> None:
@@ -122,17 +122,23 @@ class Observer:
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
         self._out = wp.zeros((simulator.n, OBSERVATION_SIZE), dtype=real, device=simulator.device)
+        self._launches = [self._record(state) for state, _ in simulator.copies]
+
+    def _record(self, state: Any) -> Any:
+        """A recorded launch for one of the two copies of the state, which hold in turn."""
+        simulator = self._simulator
+        return wp.launch(
+            observe_forward,
+            simulator.n,
+            inputs=[simulator.machines, simulator.machine_of, state],
+            outputs=[self._out],
+            device=simulator.device,
+            record_cmd=True,
+        )
 
     def __call__(self) -> NDArray[Any]:
         """The observations now."""
-        simulator = self._simulator
-        wp.launch(
-            observe_forward,
-            simulator.n,
-            inputs=[simulator.machines, simulator.machine_of, simulator.state_array],
-            outputs=[self._out],
-            device=simulator.device,
-        )
+        self._launches[self._simulator.current].launch()
         return np.array(self._out.numpy())
 
 
@@ -151,7 +157,7 @@ class MachineDriver:
         self, policy: Policy, cues: CueTrace, platform: Platform, vestibular: VestibularModel, dt: float
     ) -> None:
         self.simulator = Simulator(platform, cues, vestibular=vestibular, dt=dt)
-        self._ask = _Asked(policy, N_AXES)
+        self._ask = Asked(policy, N_AXES)
 
     def begin(self, start: ArrayLike) -> NDArray[Any]:
         """Put the machine at rest at a pose (9,); returns its state."""
@@ -183,10 +189,10 @@ class TaskDriver:
     ) -> None:
         if platform is not None:
             check_machine(policy, platform)
-        task = _deterministic(policy.task, vestibular)
+        task = deterministic(policy.task, vestibular)
         self._batch = Batch(1, task, drives=[cues], base=getattr(policy, "base_policy", None))
         self.simulator = self._batch.simulator
-        self._ask = _Asked(policy, self._batch.action_size)
+        self._ask = Asked(policy, self._batch.action_size)
 
     def begin(self, start: ArrayLike) -> NDArray[Any]:
         """Put the machine at rest at a pose (9,); returns its state."""
@@ -221,7 +227,12 @@ def check_machine(policy: TaskPolicy, platform: Platform) -> None:
         )
 
 
-def _deterministic(task: TaskOptions, vestibular: VestibularModel) -> TaskOptions:
+def deterministic(task: TaskOptions, vestibular: VestibularModel) -> TaskOptions:
+    """The environment without noise, randomness or an early end.
+
+    Raises:
+        ConfigurationError: it senses with another model.
+    """
     if task.observation.perceived and get_vestibular_model(task.vestibular) != vestibular:
         raise ConfigurationError(
             f"the policy senses with the vestibular model {task.vestibular!r}, the rollout has "

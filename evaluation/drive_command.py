@@ -1,0 +1,130 @@
+"""``motion-cueing drive``: the test client of ``motion-cueing serve``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import arg
+
+from ..envs.cues import CueTrace
+from ..envs.errors import ConfigurationError
+from ..envs.targets import check_file
+from ..train.interrupt import Interrupt
+from ..train.provenance import hardware, now, versions
+from .loop.client import Client, cues_at
+from .loop.endpoint import Endpoint, address_of, is_loopback
+from .loop.formats import make_format
+from .loop.pacing import undisturbed
+from .loop.report import SCHEMA, LoopReport, lines_of, timing_table
+from .loop.trouble import Trouble
+from .saved import save_json
+from .selection import find_car, find_maneuvers, find_platform
+from .serve_command import DEFAULT_PORT
+from .text_table import print_table, table_console
+from .words import words_of
+
+
+@dataclass(frozen=True)
+class DriveCommand:
+    """Drive a controller that `motion-cueing serve` runs: send cues in real time, check what comes back.
+
+    The exit status is 1 if nothing came back, or a set-point outside of the machine's limits. docs/loop.md
+    describes the packets.
+    """
+
+    maneuver: Annotated[str, arg(metavar="NAME|FILE")] = "double-lane-change"
+    """Maneuver or recording, by name or cue CSV file."""
+    to: Annotated[str, arg(metavar="HOST[:PORT]")] = f"127.0.0.1:{DEFAULT_PORT}"
+    """Where the controller listens."""
+    rate: int = 1000
+    """Packets a second; also the rate of the set-points that are expected."""
+    times: int = 1
+    """How often the maneuver is driven, one behind the other."""
+    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
+    """Motion base of the controller, by name or YAML file, for its limits."""
+    car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
+    """Car, by name or YAML file."""
+    format: Literal["floats", "msgpack"] = "floats"
+    """How packets are written; as the controller's."""
+    drop: float = 0.0
+    """Share of the packets that are not sent."""
+    repeat: float = 0.0
+    """Share that is sent twice."""
+    late: float = 0.0
+    """Share that is sent up to 50 ms late, out of order."""
+    nan: float = 0.0
+    """Share with a NaN in it."""
+    seed: int = 0
+    """Of what happens to packets."""
+    after: float = 1.0
+    """Time to go on listening after the last packet, s."""
+    cpu: int | None = None
+    """Core to run on alone."""
+    report: Annotated[Path | None, arg(metavar="FILE.json")] = None
+    """Counts and timings to write."""
+
+
+def run(command: DriveCommand) -> int:
+    """Drive; the exit status is 1 if nothing came back, or something outside of the limits.
+
+    Raises:
+        MotionCueingError: an argument is wrong.
+    """
+    _check(command)
+    trace = _trace(command)
+    to = address_of(command.to, DEFAULT_PORT)
+    trouble = Trouble(command.drop, command.repeat, command.late, command.nan, command.seed)
+    # From the loopback address nothing leaves this machine; other targets are reached from any.
+    endpoint = Endpoint(("127.0.0.1" if is_loopback(to) else "0.0.0.0", 0))
+    try:
+        platform, form = find_platform(command.platform), make_format(command.format)
+        client = Client(endpoint, to, form, platform, command.rate, trouble)
+        interrupt = Interrupt()
+        with interrupt.caught(), undisturbed(command.cpu):
+            client.run(cues_at(trace, command.rate, command.times), lambda: interrupt.asked)
+            client.listen(command.after)
+    finally:
+        endpoint.close()
+    return _finish(command, client, endpoint)
+
+
+def _check(command: DriveCommand) -> None:
+    if command.rate < 1 or command.times < 1 or not command.after >= 0.0:
+        raise ConfigurationError("--rate and --times must be at least 1, --after at least 0")
+    if command.report is not None:
+        check_file("--report", command.report)
+
+
+def _trace(command: DriveCommand) -> CueTrace:
+    sources = find_maneuvers((command.maneuver,), find_car(command.car))
+    if len(sources) != 1:
+        raise ConfigurationError(f"--maneuver {command.maneuver} means several drives; name one")
+    (source,) = sources.values()
+    return source()
+
+
+def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
+    report = LoopReport(
+        schema=SCHEMA,
+        command=" ".join(words_of("drive", command)),
+        created=now(),
+        versions=versions(),
+        hardware=hardware("cpu"),
+        duration=client.duration,
+        periods=client.sent,
+        overrun=client.pace.overrun,
+        skipped=client.pace.skipped,
+        packets={**client.counts, "unsent": endpoint.unsent},
+        steps={state.name.lower(): count for state, count in client.states.items()},
+        timings={name: histogram.summary() for name, histogram in client.timings.items()},
+        faults=tuple(client.faults),
+    )
+    console = table_console()
+    for line in lines_of(report):
+        console.print(line, highlight=False, markup=False)
+    print_table(console, timing_table(report))
+    if command.report is not None:
+        save_json(report, command.report)
+    return 0 if client.counts["received"] and not client.counts["outside_limits"] else 1

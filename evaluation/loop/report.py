@@ -1,0 +1,78 @@
+"""What a controller or its client counted and timed, as JSON and as a table."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Final
+
+from ...envs.settings import configuration
+from ..text_table import NOTHING, TextTable
+from .histogram import QUANTILES, TimingSummary
+
+SCHEMA: Final = 1
+"""Version of the file; a reader refuses others."""
+
+
+@configuration
+class LoopReport:
+    """A run of the controller, or of its client.
+
+    Args:
+        schema: :data:`SCHEMA`.
+        command: The command line.
+        created: UTC, ISO 8601.
+        versions: Of this package, Python and the libraries that matter.
+        hardware: What it ran on.
+        duration: From the first period to the last, s.
+        periods: That were made.
+        overrun: That were not over when the next should have begun.
+        skipped: That were left out, as an earlier one took so long.
+        packets: That came, by what became of them.
+        steps: Of 10 ms, by state of the controller.
+        timings: By name, see docs/loop.md.
+        faults: What the policy raised; or what was wrong with the set-points.
+    """
+
+    schema: int
+    command: str
+    created: str
+    versions: dict[str, str]
+    hardware: str
+    duration: float
+    periods: int
+    overrun: int
+    skipped: int
+    packets: dict[str, int]
+    timings: dict[str, TimingSummary]
+    steps: dict[str, int] = field(default_factory=dict)
+    faults: tuple[str, ...] = ()
+
+
+def timing_table(report: LoopReport) -> TextTable:
+    """The timings, in microseconds."""
+    header = ("time, us", "count", "mean", *(name.replace("_", ".") for name in QUANTILES), "max")
+    rows = [
+        (name, str(found.count), *(_microseconds(getattr(found, key)) for key in ("mean", *QUANTILES, "max")))
+        for name, found in report.timings.items()
+    ]
+    return TextTable("Timings", header, tuple(rows))
+
+
+def lines_of(report: LoopReport) -> list[str]:
+    """What was counted, in words; what did not happen is left out."""
+    missed = report.overrun + report.skipped
+    share = missed / max(report.periods + report.skipped, 1)
+    counted = ", ".join(
+        f"{name.replace('_', ' ')} {count}" for name, count in report.packets.items() if count
+    )
+    steps = ", ".join(f"{name} {count}" for name, count in report.steps.items() if count)
+    lines = [
+        f"{report.periods} periods in {report.duration:.1f} s; deadlines missed: {missed} "
+        f"({100.0 * share:.4f} %), {report.overrun} late and {report.skipped} left out",
+        f"packets: {counted or 'none'}",
+    ]
+    return [*lines, *([f"steps of 10 ms: {steps}"] if steps else []), *report.faults]
+
+
+def _microseconds(seconds: float | None) -> str:
+    return NOTHING if seconds is None else f"{1e6 * seconds:.1f}"
