@@ -20,6 +20,7 @@ from .ladder import ALL_RUNGS
 from .ladder_figure import ladder_figure
 from .ladder_table import ladder_table, save_ladder
 from .provenance import provenance
+from .replay import DRIVEN, cue_sources, load_drives
 from .report import save_report
 from .results import Results
 from .selection import ALL, find_car, find_maneuvers, find_platform, find_policies
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
 Name = Annotated[str, arg(metavar="NAME|FILE")]
 Names = Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
+Files = Annotated[tuple[Path, ...], arg(metavar="FILE.npz ...")]
 Folder = Annotated[Path, arg(metavar="DIR")]
 
 
@@ -52,6 +54,8 @@ class EvaluateCommand:
     """Policies, by name or file; default: the ones meant for comparison; `ladder` for all controllers."""
     maneuver: Names = (ALL,)
     """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
+    replay: Files = ()
+    """Drives to score as they were driven, and their cues to drive: logs of `motion-cueing serve`."""
     platform: Name = "paper"
     """Motion base, by name or YAML file."""
     car: Name = "sedan"
@@ -140,16 +144,29 @@ def make_plan(command: EvaluateCommand) -> Plan:
     check_folder("--out", command.out)
     check_own_json("--out", command.out / "results.json", frozenset({"schema", "provenance"}))
     platform, car = find_platform(command.platform), find_car(command.car)
-    policies, left_out = _line_up(command, platform, car)
+    recorded = _recorded(command, platform)
+    policies, left_out = _line_up(command, platform, car) if command.policy or not recorded else ({}, {})
     return Plan(
-        maneuvers=find_maneuvers(command.maneuver, car),
-        policies=policies,
+        maneuvers=cue_sources(recorded) if recorded else find_maneuvers(command.maneuver, car),
+        policies={**_as_driven(recorded), **policies},
         platform=platform,
         car=car,
         out=command.out,
         arguments=command_line(command),
         left_out=left_out,
     )
+
+
+def _recorded(command: EvaluateCommand, platform: Platform) -> dict[str, Trajectory]:
+    """Drives by label that are not to be driven again."""
+    if command.replay and command.maneuver != EvaluateCommand().maneuver:
+        raise ConfigurationError("--replay has its own cues; leave --maneuver out")
+    return load_drives(command.replay, platform)
+
+
+def _as_driven(recorded: Mapping[str, Trajectory]) -> dict[str, Drive]:
+    """What gives the recorded drives, where there are any."""
+    return {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
 
 
 def _line_up(
