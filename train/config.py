@@ -104,6 +104,28 @@ class Choice:
 
 
 @configuration
+class PopulationOptions:
+    """How a population is trained.
+
+    Shares and factors are those of Jaderberg et al., "Population Based Training of Neural Networks", 2017,
+    section 4.1.1; the rest is chosen.
+
+    Args:
+        members: Trainings.
+        interval: Validations between exchanges.
+        replaced: Share that goes on from the best, as many as those are.
+        factors: What a value is multiplied by, one of them at random.
+        redrawn: Probability that a value is drawn anew instead.
+    """
+
+    members: Annotated[int, Field(ge=2)] = 8
+    interval: PositiveCount = 1
+    replaced: Annotated[float, Field(gt=0.0, le=0.5)] = 0.2
+    factors: tuple[Positive, Positive] = (0.8, 1.2)
+    redrawn: Annotated[float, Field(ge=0.0, le=1.0)] = 0.1
+
+
+@configuration
 class TrainingConfig:
     """A training; with its seed it determines the agent.
 
@@ -123,7 +145,8 @@ class TrainingConfig:
         log_every: Actions between rows of the log.
         threads: Of PyTorch.
         device: Of network and simulation: "cpu" or "cuda:0" and the like.
-        search: What a search varies: fields by path, as ``hyperparameters.learning_rate``.
+        search: What a search or a population varies: fields by path, as ``hyperparameters.learning_rate``.
+        population: How a population is trained.
     """
 
     algo: str
@@ -141,6 +164,7 @@ class TrainingConfig:
     threads: PositiveCount = 1
     device: str = "cpu"
     search: dict[str, Choice] = field(default_factory=dict)
+    population: PopulationOptions = PopulationOptions()
 
     def __post_init__(self) -> None:
         episode = self.task.episode

@@ -16,7 +16,9 @@ from ..envs.storage import write_text
 STEPS: Final = "steps"
 """Column of the actions so far."""
 
-_CSV: Final = "log.csv"
+LOG: Final = "log.csv"
+"""Its name in the folder of a training."""
+
 _EVENTS: Final = "tensorboard"
 
 
@@ -34,7 +36,7 @@ class TrainingLog:
     """
 
     def __init__(self, folder: Path, steps: int = 0) -> None:
-        self._path = folder / _CSV
+        self._path = folder / LOG
         self.rows = [row for row in read_log(folder) if row[STEPS] <= steps]
         self._events: Any = SummaryWriter(str(folder / _EVENTS), purge_step=steps + 1)
 
@@ -70,7 +72,7 @@ def read_log(folder: Path) -> list[dict[str, float]]:
     Raises:
         DataError: the file is broken.
     """
-    path = folder / _CSV
+    path = folder / LOG
     if not path.exists():
         return []
     try:

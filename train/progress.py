@@ -9,12 +9,36 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 
 from .training import Status
+
+
+def make_bars(console: Console) -> Progress:
+    """Bars with speed and time left; none but on a terminal."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
+    )
+
+
+def move(bars: Progress, task: TaskID, status: Status) -> None:
+    """Move a bar to where a training is."""
+    speed = next((bar.speed for bar in bars.tasks if bar.id == task), None)
+    rate = f"{speed:,.0f} a second" if speed else ""
+    bars.update(task, completed=status.steps, rate=rate)
 
 
 class TrainingProgress:
@@ -27,18 +51,7 @@ class TrainingProgress:
 
     def __init__(self, total: int, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True)
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=self._console,
-            disable=not self._console.is_terminal,
-            transient=True,
-        )
+        self._bar = make_bars(self._console)
         self._task = self._bar.add_task("training", total=total, rate="")
 
     def __enter__(self) -> TrainingProgress:
@@ -54,9 +67,7 @@ class TrainingProgress:
 
     def tell(self, status: Status) -> None:
         """Move the bar, and write a line if there is news."""
-        speed = self._bar.tasks[0].speed
-        rate = f"{speed:,.0f} a second" if speed else ""
-        self._bar.update(self._task, completed=status.steps, rate=rate)
+        move(self._bar, self._task, status)
         if status.news:
             self._console.print(line_of(status), highlight=False, soft_wrap=True)
 

@@ -79,6 +79,17 @@ class RunFolder:
             raise DataError(f"{path / _RECORD}: cannot be read ({error})") from None
         return run
 
+    @classmethod
+    def take_up(cls, path: Path, config: TrainingConfig) -> RunFolder:
+        """The folder of a training that may have been begun: of a process that died, nobody knows.
+
+        Raises:
+            DataError: a file of it is broken.
+        """
+        run = cls.open(path) if (path / _RECORD).exists() else cls(path, config)
+        run.config = config
+        return run
+
     @property
     def checkpoints(self) -> Path:
         """The folder of checkpoints."""

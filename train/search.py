@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import multiprocessing
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,22 +11,21 @@ from typing import Any, Final
 
 import numpy as np
 import optuna
-from optuna.storages import JournalStorage
-from optuna.storages.journal import JournalFileBackend
-from optuna.trial import TrialState
+from optuna.trial import FrozenTrial, TrialState
 
-from ..envs.errors import ConfigurationError, DataError
-from ..envs.settings import from_dict, load, save, to_dict
+from ..envs.errors import DataError
+from ..envs.settings import load, save
 from ..envs.storage import write_text
-from .config import CheckpointOptions, Choice, TrainingConfig
-from .run import RunFolder, free_folder
-from .training import Status, Training, rating
+from .config import Choice, TrainingConfig
+from .engine import Ending, Engine, Job, Listener
+from .run import free_folder
+from .space import check_space, varied
+from .training import Status
+from .trial_job import JOURNAL, TrialJob, create_study, load_study
 
 _CONFIG: Final = "config.yaml"
-_JOURNAL: Final = "search.journal"
 _TABLE: Final = "results.csv"
 _BEST: Final = "best.yaml"
-_STUDY: Final = "training"
 _FINISHED: Final = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
@@ -44,10 +42,7 @@ class Search:
 
     def __init__(self, path: Path, config: TrainingConfig) -> None:
         self.path, self.config = path, config
-        if not config.search:
-            raise ConfigurationError("search is empty; name fields to vary, as hyperparameters.learning_rate")
-        for choose in (_first, _last):
-            self._config_with({name: choose(choice) for name, choice in config.search.items()})
+        check_space(config)
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> Search:
@@ -58,10 +53,7 @@ class Search:
         """
         search = cls(free_folder(path, f"{config.algo}-search"), config)
         save(config, search.path / _CONFIG)
-        optuna.logging.set_verbosity(optuna.logging.WARNING)
-        optuna.create_study(
-            storage=search._storage(), study_name=_STUDY, direction="minimize", pruner=_pruner()
-        )
+        create_study(search.path)
         return search
 
     @classmethod
@@ -72,80 +64,32 @@ class Search:
             DataError: there is none.
         """
         if not is_search(path):
-            raise DataError(f"--resume {path}: no search was begun there ({_JOURNAL} is missing)")
-        search = cls(path, load(TrainingConfig, path / _CONFIG))
-        search._take_up_broken_off()
-        return search
+            raise DataError(f"--resume {path}: no search was begun there ({JOURNAL} is missing)")
+        return cls(path, load(TrainingConfig, path / _CONFIG))
 
-    def _storage(self) -> JournalStorage:
-        return JournalStorage(JournalFileBackend(str(self.path / _JOURNAL)))
-
-    def study(self, worker: int = 0) -> optuna.Study:
-        """The study; each worker draws from a generator of its own, and none repeats an earlier session."""
-        study = optuna.load_study(storage=self._storage(), study_name=_STUDY, pruner=_pruner())
-        entropy = (self.config.seed, len(study.trials), worker)
+    def study(self) -> optuna.Study:
+        """The study; a session does not repeat what an earlier one drew."""
+        study = load_study(self.path)
+        entropy = (self.config.seed, len(study.trials))
         seed = int(np.random.SeedSequence(entropy).generate_state(1)[0])
         study.sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
         return study
 
-    def _take_up_broken_off(self) -> None:
-        """Trials of a session that ended without a word are tried again."""
-        study = self.study()
-        for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-            study.enqueue_trial(trial.params)
-            study.tell(trial.number, state=TrialState.FAIL)
+    def run(self, trials: int, engine: Engine, listener: Listener) -> bool:
+        """Train until there are ``trials`` results; returns whether Ctrl-C stopped it.
 
-    def run(self, trials: int, jobs: int) -> bool:
-        """Train until there are ``trials`` results; returns whether Ctrl-C stopped it."""
-        done = len(self.study().get_trials(deepcopy=False, states=_FINISHED))
-        context = multiprocessing.get_context("spawn")
-        left = context.Value("i", max(0, trials - done))
-        if jobs == 1:
-            interrupted = _work(self.path, self.config, left, 0)
-        else:
-            arguments = [(self.path, self.config, left, worker) for worker in range(jobs)]
-            workers = [context.Process(target=_work, args=given) for given in arguments]
-            interrupted = _join(workers)
-        self.report()
-        return interrupted
-
-    def try_one(self, study: optuna.Study) -> bool:
-        """One training; returns whether Ctrl-C stopped it."""
-        trial = study.ask()
-        for name, choice in self.config.search.items():
-            _suggest(trial, name, choice)
+        Trials of a session that ended in the middle of them go on.
+        """
+        session = _Session(self, trials, listener)
         try:
-            value, state = self._train(trial), TrialState.COMPLETE
-        except optuna.TrialPruned:
-            value, state = None, TrialState.PRUNED
-        except KeyboardInterrupt:
-            study.enqueue_trial(trial.params)
-            study.tell(trial, state=TrialState.FAIL)
-            return True
-        except Exception as error:
-            # One that diverges, or whose values do not go together, must not end the search.
-            study.tell(trial, state=TrialState.FAIL)
-            print(f"trial {trial.number}: failed ({' '.join(str(error).split())})", flush=True)
-            return False
-        study.tell(trial, value, state)
-        print(f"trial {trial.number}: {_result(value)}", flush=True)
-        return False
+            return engine.run(session.next_job, session)
+        finally:
+            self.report()
 
-    def _train(self, trial: optuna.Trial) -> float:
-        config = self._config_with(self._values(trial.params))
-        every = config.validation.every
-
-        def tell(status: Status) -> None:
-            if status.score is not None and status.news and status.steps >= every:
-                trial.report(rating(status.score, config.validation.best), status.steps // every)
-                if trial.should_prune() and status.steps < status.total:
-                    raise optuna.TrialPruned
-
-        folder = RunFolder.create(self.path / "trials" / f"{trial.number:04d}", config)
-        outcome = Training(folder, tell).train()
-        if outcome.interrupted or outcome.status.best is None:
-            raise KeyboardInterrupt
-        return outcome.status.best
+    def job(self, trial: FrozenTrial | optuna.Trial, params: Mapping[str, Any]) -> TrialJob:
+        """The training of a trial."""
+        config = self._config_with(self._values(params))
+        return TrialJob(trial.number, trial._trial_id, self.path.resolve(), config)
 
     def _values(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
         """Values of what was drawn: of choices, Optuna is only told the place."""
@@ -154,16 +98,13 @@ class Search:
             for name, found in drawn.items()
         }
 
-    def _config_with(self, params: Mapping[str, Any]) -> TrainingConfig:
+    def _config_with(self, values: Mapping[str, Any]) -> TrainingConfig:
         """A trial's configuration."""
-        values = to_dict(replace(self.config, search={}, checkpoints=CheckpointOptions(every=0)))
-        for name, value in params.items():
-            _set(values, name, value)
-        return from_dict(TrainingConfig, values, "search")
+        return varied(self.config, values, checkpoints=replace(self.config.checkpoints, keep=1))
 
     def report(self) -> None:
         """Write the table of all trials, and the configuration of the best."""
-        trials = self.study().get_trials(deepcopy=False)
+        trials = load_study(self.path).get_trials(deepcopy=False)
         names = list(self.config.search)
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
@@ -181,7 +122,7 @@ class Search:
 
     def best(self) -> Any:
         """The best trial, or None while there is none."""
-        trials = self.study().get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+        trials = load_study(self.path).get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
         return min(trials, key=lambda trial: float(trial.value or 0.0)) if trials else None
 
     @property
@@ -190,82 +131,65 @@ class Search:
         return self.path / _BEST
 
 
+class _Session:
+    """Draws trials for an engine, and notes what came of them."""
+
+    def __init__(self, search: Search, trials: int, listener: Listener) -> None:
+        self._search, self._listener = search, listener
+        self._study = search.study()
+        known = self._study.get_trials(deepcopy=False)
+        done = sum(trial.state in _FINISHED for trial in known)
+        self._left = max(0, trials - done)
+        self._begun = [trial for trial in known if trial.state is TrialState.RUNNING]
+        # A process that ended while one was drawn.
+        for trial in [trial for trial in self._begun if len(trial.params) < len(search.config.search)]:
+            self._study.tell(trial.number, state=TrialState.FAIL)
+            self._begun.remove(trial)
+
+    def next_job(self) -> TrialJob | None:
+        """The next trial's."""
+        if self._left == 0:
+            return None
+        self._left -= 1
+        if self._begun:
+            begun = self._begun.pop(0)
+            return self._search.job(begun, begun.params)
+        trial = self._study.ask()
+        for name, choice in self._search.config.search.items():
+            suggest(trial, name, choice)
+        return self._search.job(trial, trial.params)
+
+    def told(self, job: Job, status: Status) -> None:
+        """Pass on where a trial is."""
+        self._listener.told(job, status)
+
+    def ended(self, job: Job, ending: Ending) -> None:
+        """Note a result; one that was interrupted stays begun."""
+        assert isinstance(job, TrialJob)
+        self._listener.ended(job, ending)
+        tried = ending.result
+        if ending.error is not None:
+            self._study.tell(job.number, state=TrialState.FAIL)
+            print(f"{job.name}: failed ({ending.error})", flush=True)
+        elif not tried.interrupted:
+            state = TrialState.PRUNED if tried.value is None else TrialState.COMPLETE
+            self._study.tell(job.number, tried.value, state)
+            print(f"{job.name}: {_result(tried.value)}", flush=True)
+
+
 def is_search(path: Path) -> bool:
     """Whether a folder is that of a search."""
-    return (path / _JOURNAL).exists()
+    return (path / JOURNAL).exists()
 
 
-def _pruner() -> optuna.pruners.BasePruner:
-    return optuna.pruners.MedianPruner(n_startup_trials=4)
-
-
-def _work(path: Path, config: TrainingConfig, left: Any, worker: int) -> bool:
-    """Take trials until none is left, in this process; returns whether Ctrl-C stopped it."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    try:
-        search = Search(path, config)
-        study = search.study(worker)
-        while _take(left):
-            if search.try_one(study):
-                return True
-    except KeyboardInterrupt:
-        return True
-    return False
-
-
-def _take(left: Any) -> bool:
-    with left.get_lock():
-        left.value -= 1
-        return bool(left.value >= 0)
-
-
-def _join(workers: list[Any]) -> bool:
-    """Run processes to their end; Ctrl-C reaches them, too, and ends them."""
-    for worker in workers:
-        worker.start()
-    try:
-        for worker in workers:
-            worker.join()
-    except KeyboardInterrupt:
-        for worker in workers:
-            worker.join()
-        return True
-    broken = [worker for worker in workers if worker.exitcode != 0]
-    if broken:
-        raise DataError(f"{len(broken)} of {len(workers)} processes of the search ended with an error")
-    return False
-
-
-def _suggest(trial: optuna.Trial, name: str, choice: Choice) -> None:
+def suggest(trial: optuna.Trial, name: str, choice: Choice) -> None:
+    """Draw a field; of choices, the place is drawn."""
     if choice.choices:
         trial.suggest_categorical(name, range(len(choice.choices)))
     elif choice.integer:
         trial.suggest_int(name, int(choice.low or 0), int(choice.high or 0), log=choice.log)
     else:
         trial.suggest_float(name, choice.low or 0.0, choice.high or 0.0, log=choice.log)
-
-
-def _first(choice: Choice) -> Any:
-    return choice.choices[0] if choice.choices else int(choice.low or 0) if choice.integer else choice.low
-
-
-def _last(choice: Choice) -> Any:
-    return choice.choices[-1] if choice.choices else int(choice.high or 0) if choice.integer else choice.high
-
-
-def _set(values: dict[str, Any], path: str, value: Any) -> None:
-    """Set a field by its path.
-
-    Raises:
-        ConfigurationError: the path does not lead through fields.
-    """
-    *parents, last = path.split(".")
-    for name in parents:
-        inner = values.setdefault(name, {})
-        if not isinstance(inner, dict):
-            raise ConfigurationError(f"search: {path!r} leads through {name!r}, which has no fields")
-        values = inner
-    values[last] = value
 
 
 def _result(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""``motion-cueing train``: train an agent, go on with one, or search for hyperparameters."""
+"""``motion-cueing train``: train an agent or several, go on with them, or search for hyperparameters."""
 
 from __future__ import annotations
 
@@ -10,16 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from tyro.conf import arg
 
-from ..envs.errors import ConfigurationError
+from ..envs.errors import ConfigurationError, UnknownNameError
 from .config import TrainingConfig, load_config
 from .registry import algorithm_names
 
 if TYPE_CHECKING:
+    from .population import Population
     from .run import RunFolder
-    from .training import Outcome
+    from .search import Search
+    from .seeds import Seeds
 
-_INTERRUPTED: Final = 130
-_SUCCESS: Final = 0
+_LOCAL: Final = "local"
+_RAY: Final = "ray"
+_SEVERAL: Final = ("search", "seeds", "population")
+"""Options that ask for several trainings."""
 _NEEDED: Final = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "optuna", "safetensors")
 
 
@@ -45,13 +49,22 @@ class TrainCommand:
     out: Annotated[Path | None, arg(metavar="DIR")] = None
     """New folder for everything that comes of it; default: runs/ALGO-1 and so on."""
     resume: Annotated[Path | None, arg(metavar="DIR")] = None
-    """Folder of a training to go on with, from its last checkpoint; --steps may change its length. Or of a
-    search, to go on with --search."""
+    """Folder of a training, seeds or a population to go on with, from the last checkpoints; --steps may
+    change how long it is. Or of a search, to go on with --search."""
     search: Annotated[int | None, arg(metavar="N")] = None
     """Search for hyperparameters instead, until N trainings are done; the field `search` of the configuration
     says what is varied, --steps how long each is."""
+    seeds: Annotated[int | None, arg(metavar="N")] = None
+    """Train with N seeds: --seed and those that follow."""
+    population: Annotated[int | None, arg(metavar="N")] = None
+    """Train a population of N: the worst go on from the best, with other values of what the field `search`
+    names; the field `population` says how."""
     jobs: Annotated[int | None, arg(metavar="N")] = None
-    """Trainings of a search at a time, each in a process of its own; default: 1."""
+    """Trainings at a time, each in a process of its own; default: 1, with Ray one a core."""
+    engine: Annotated[str | None, arg(metavar="local|ray")] = None
+    """Where trainings run: this machine alone, or Ray; default: local."""
+    address: Annotated[str | None, arg(metavar="HOST:PORT")] = None
+    """Ray cluster to run on, which this machine is a part of; default: a Ray of its own on this machine."""
 
 
 def run(command: TrainCommand) -> int:
@@ -66,22 +79,51 @@ def run(command: TrainCommand) -> int:
             f"training needs {', '.join(missing)}: pip install 'motion-cueing-gym[train]'"
         )
     _check(command)
-    return _search(command) if command.search is not None else _train(command)
+    kind = _kind(command)
+    if kind == "training" and command.engine != _RAY:
+        return _train(command)
+    return _run(command, kind)
 
 
 def _check(command: TrainCommand) -> None:
-    if command.search is None and command.jobs is not None:
-        raise ConfigurationError("--jobs is of use only with --search; leave it out")
-    for name in ("search", "jobs"):
+    for name in (*_SEVERAL, "jobs"):
         value = getattr(command, name)
         if value is not None and value < 1:
             raise ConfigurationError(f"--{name} must be at least 1, found {value}")
-    if command.resume is None:
-        return
-    kept = ("resume", "search", "jobs") if command.search is not None else ("resume", "steps")
+    named = [name for name in _SEVERAL if getattr(command, name) is not None]
+    if len(named) > 1:
+        raise ConfigurationError(f"--{named[0]} and --{named[1]} do not go together; leave one out")
+    if command.engine not in (None, _LOCAL, _RAY):
+        raise UnknownNameError("engine", command.engine, (_LOCAL, _RAY))
+    if command.address is not None and command.engine != _RAY:
+        raise ConfigurationError("--address is of use only with --engine ray; leave it out")
+    if command.resume is not None:
+        _check_resume(command)
+
+
+def _check_resume(command: TrainCommand) -> None:
+    kept = {"resume", "jobs", "engine", "address", "steps" if command.search is None else "search"}
     for option in fields(command):
         if option.name not in kept and getattr(command, option.name) is not None:
             raise ConfigurationError(f"--{option.name} cannot be changed with --resume; leave it out")
+
+
+def _kind(command: TrainCommand) -> str:
+    """What is trained; with ``--resume``, the folder says it.
+
+    Raises:
+        ConfigurationError: an option is of no use there.
+    """
+    kind = next((name for name in _SEVERAL if getattr(command, name) is not None), None)
+    if kind is None and command.resume is not None:
+        from .studies import kind_of
+
+        kind = kind_of(command.resume)
+    if kind is None and command.jobs is not None:
+        raise ConfigurationError("--jobs is of use only where there are several trainings; leave it out")
+    if kind == "population" and command.resume is not None and command.steps is not None:
+        raise ConfigurationError("--steps of a population cannot be changed with --resume; leave it out")
+    return kind or "training"
 
 
 def _config(command: TrainCommand) -> TrainingConfig:
@@ -92,55 +134,68 @@ def _config(command: TrainCommand) -> TrainingConfig:
         seed=command.seed,
         n_envs=command.envs,
         initial=None if command.initial is None else str(command.initial),
+        population=None if command.population is None else {"members": command.population},
     )
+
+
+def _folder(command: TrainCommand) -> RunFolder:
+    from .run import RunFolder
+
+    if command.resume is None:
+        return RunFolder.create(command.out, _config(command))
+    folder = RunFolder.open(command.resume)
+    if command.steps is not None:
+        folder.extend(command.steps)
+    for change in folder.changed_versions():
+        print(f"note: {change}; the agent may differ in its last bits", file=sys.stderr)
+    return folder
 
 
 def _train(command: TrainCommand) -> int:
     from .progress import TrainingProgress
-    from .run import RunFolder
+    from .studies import report_training
     from .training import Training
 
-    if command.resume is None:
-        folder = RunFolder.create(command.out, _config(command))
-    else:
-        folder = RunFolder.open(command.resume)
-        if command.steps is not None:
-            folder.extend(command.steps)
-        for change in folder.changed_versions():
-            print(f"note: {change}; the agent may differ in its last bits", file=sys.stderr)
+    folder = _folder(command)
     with TrainingProgress(folder.config.steps) as progress:
         outcome = Training(folder, progress.tell).train()
-    return _report(folder, outcome)
+    return report_training(folder, outcome)
 
 
-def _report(folder: RunFolder, outcome: Outcome) -> int:
-    steps = outcome.status.steps
-    if outcome.interrupted:
-        _stopped(f"stopped after {steps:,} steps; go on with: motion-cueing train --resume {folder.path}")
-        return _INTERRUPTED
-    print(f"{folder.final_agent}: the agent after {steps:,} steps")
-    if folder.best_agent.exists():
-        print(f"{folder.best_agent}: the best on the validation drives")
-    return _SUCCESS
+def _run(command: TrainCommand, kind: str) -> int:
+    """What an engine runs."""
+    from . import studies
+
+    place = studies.Place(command.engine or _LOCAL, command.jobs, command.address)
+    place.check()
+    if kind == "training":
+        return studies.run_training(_folder(command), place)
+    if kind == "search":
+        return studies.run_search(_search(command), command.search or 1, place)
+    if kind == "seeds":
+        return studies.run_seeds(_seeds(command), place)
+    return studies.run_population(_population(command), place)
 
 
-def _search(command: TrainCommand) -> int:
+def _search(command: TrainCommand) -> Search:
     from .search import Search
 
     if command.resume is None:
-        search = Search.create(command.out, _config(command))
-    else:
-        search = Search.open(command.resume)
-    trials = command.search or 1
-    interrupted = search.run(trials, command.jobs or 1)
-    if interrupted:
-        _stopped(f"stopped; go on with: motion-cueing train --resume {search.path} --search {trials}")
-        return _INTERRUPTED
-    best = search.best()
-    if best is not None:
-        print(f"{search.best_config}: trial {best.number}, {best.value:.4g}")
-    return _SUCCESS
+        return Search.create(command.out, _config(command))
+    return Search.open(command.resume)
 
 
-def _stopped(message: str) -> None:
-    print(message, file=sys.stderr)
+def _seeds(command: TrainCommand) -> Seeds:
+    from .seeds import Seeds
+
+    if command.resume is None:
+        return Seeds.create(command.out, _config(command), command.seeds or 1)
+    return Seeds.open(command.resume, command.steps)
+
+
+def _population(command: TrainCommand) -> Population:
+    from .population import Population
+
+    if command.resume is None:
+        return Population.create(command.out, _config(command))
+    return Population.open(command.resume)

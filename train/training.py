@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,13 +79,16 @@ class Training:
     Args:
         run: The folder; a checkpoint in it is gone on from.
         tell: Shown the status at every boundary.
+        interrupt: Whoever decides when to stop; default: Ctrl-C, which is caught while it trains.
 
     Raises:
         ConfigurationError: the configuration does not fit its algorithm.
         DataError: the checkpoint is damaged.
     """
 
-    def __init__(self, run: RunFolder, tell: Tell = lambda status: None) -> None:
+    def __init__(
+        self, run: RunFolder, tell: Tell = lambda status: None, interrupt: Interrupt | None = None
+    ) -> None:
         self.run, self.config, self._tell = run, run.config, tell
         state = run.last_checkpoint()
         # A checkpoint goes before the agent that the training began with, which may be gone by now.
@@ -94,7 +98,8 @@ class Training:
         self.learner: Learner = make_learner(config)
         self.validation = Validation(run.config)
         self._clock, self._seen = _Clock(), -1
-        self._interrupt = Interrupt()
+        self._interrupt = interrupt or Interrupt()
+        self._caught = self._interrupt.caught if interrupt is None else nullcontext
         self.status = Status(0, run.config.steps)
         if state is not None:
             self._go_on(state)
@@ -104,6 +109,9 @@ class Training:
         self._clock = _Clock(state["elapsed"])
         self._seen = self.status.steps = self.learner.steps
         self.status.best, self.status.reference = state["best"], state["reference"]
+        # Checkpoints before this was kept have none.
+        if state.get("score") is not None:
+            self.status.score = Score(**state["score"])
         if state["initial"] is not None:
             self._initial = from_dict(Record, state["initial"], "initial")
 
@@ -114,7 +122,7 @@ class Training:
         self.run.begin(self.status.steps)
         self.log = TrainingLog(self.run.path, self.status.steps)
         try:
-            with self._interrupt.caught():
+            with self._caught():
                 if self.status.reference is None:
                     self._measure_reference()
                 self.learner.learn(self._boundary)
@@ -191,6 +199,7 @@ class Training:
             "elapsed": self._clock.total,
             "best": self.status.best,
             "reference": self.status.reference,
+            "score": None if self.status.score is None else asdict(self.status.score),
             "initial": None if self._initial is None else to_dict(self._initial),
         }
         return self.run.save_checkpoint(self.status.steps, state)

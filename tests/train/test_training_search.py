@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import signal
 from dataclasses import replace
 
 import optuna
@@ -12,9 +13,12 @@ from optuna.trial import TrialState
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import from_dict, load
 from motion_cueing.evaluation.command_line import main
+from motion_cueing.train import training
 from motion_cueing.train.agent import Agent
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.search import Search, _suggest
+from motion_cueing.train.engine import make_engine
+from motion_cueing.train.fleet_progress import FleetProgress
+from motion_cueing.train.search import Search, suggest
 from motion_cueing.train.training import Training
 
 from . import tiny
@@ -24,6 +28,11 @@ SPACE = {
     "hyperparameters.learning_rate": {"low": 1e-4, "high": 1e-2, "log": True},
     "task.action.repeat": {"low": 4, "high": 6, "integer": True},
 }
+
+
+def run(search: Search, trials: int) -> bool:
+    with make_engine("local") as engine:
+        return search.run(trials, engine, FleetProgress())
 
 
 def rows(search: Search) -> list[dict[str, str]]:
@@ -55,7 +64,7 @@ def test_a_search_finds_a_configuration_resumes_and_runs_in_processes(tmp_path, 
     agent = Agent.load(out / "trials" / f"{int(best['trial']):04d}" / "best.safetensors")
     assert agent.record.validation == pytest.approx(float(best["result"]), rel=1e-5)
     # All results are there: nothing is trained again.
-    assert not search.run(4, 1)
+    assert not run(search, 4)
     assert len(rows(search)) == 4
 
 
@@ -63,7 +72,7 @@ def test_hopeless_trainings_are_broken_off(tmp_path, monkeypatch):
     config = tiny.config(tmp_path, "ppo", search=SPACE, validation={"every": 64})
     search = Search.create(tmp_path / "search", config)
     monkeypatch.setattr(optuna.Trial, "should_prune", lambda trial: trial.number == 1)
-    assert not search.run(2, 1)
+    assert not run(search, 2)
     assert [row["state"] for row in rows(search)] == ["complete", "pruned"]
     assert not (search.path / "trials" / "0001" / "final.safetensors").exists()
 
@@ -72,38 +81,56 @@ def test_a_training_that_fails_is_told_and_not_counted(tmp_path, monkeypatch, ca
     search = Search.create(tmp_path / "search", tiny.config(tmp_path, "ppo", search=SPACE, steps=64))
     train = Training.train
 
-    def fail_once(training: Training):
-        if training.run.path.name == "0000":
+    def fail_once(begun: Training):
+        if begun.run.path.name == "0000":
             raise ValueError("not\nfinite")
-        return train(training)
+        return train(begun)
 
     monkeypatch.setattr(Training, "train", fail_once)
-    assert not search.run(2, 1)
+    assert not run(search, 2)
     assert "trial 0: failed (not finite)" in capsys.readouterr().out
     assert [row["state"] for row in rows(search)] == ["fail", "complete"]
-    assert not search.run(2, 1)
+    assert not run(search, 2)
     assert [row["state"] for row in rows(search)] == ["fail", "complete", "complete"]
 
 
-def test_ctrl_c_and_a_killed_process_leave_trials_to_be_tried_again(tmp_path, monkeypatch):
-    search = Search.create(tmp_path / "search", tiny.config(tmp_path, "ppo", search=SPACE, steps=64))
+def test_trials_stopped_by_ctrl_c_or_by_a_killed_process_go_on(tmp_path, monkeypatch):
+    config = tiny.config(tmp_path, "ppo", search=SPACE, steps=128)
+    search = Search.create(tmp_path / "search", config)
+    boundary = Training._boundary
 
-    def interrupted(training: Training):
-        raise KeyboardInterrupt
+    def pressed(begun: Training) -> None:
+        signal.raise_signal(signal.SIGINT)
+        boundary(begun)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Training, "train", interrupted)
-        assert search.run(1, 1)
-    first = search.study().trials
-    assert [trial.state for trial in first] == [TrialState.FAIL, TrialState.WAITING]
-    killed = search.study().ask()
+        patched.setattr(Training, "_boundary", pressed)
+        assert run(search, 1)
+    assert [path.name for path in (search.path / "trials/0000/checkpoints").iterdir()]
+    study = search.study()
+    killed, unfinished = study.ask(), study.ask()
     for name, choice in search.config.search.items():
-        _suggest(killed, name, choice)
+        suggest(killed, name, choice)
+    assert [trial.state for trial in study.trials] == [TrialState.RUNNING] * 3
     search = Search.open(search.path)
-    assert not search.run(1, 1)
-    done = [trial for trial in search.study().trials if trial.state is TrialState.COMPLETE]
-    assert len(done) == 1
-    assert done[0].params == first[0].params
+    assert not run(search, 3)
+    trials = search.study().trials
+    assert [trial.state for trial in trials] == [TrialState.COMPLETE] * 2 + [
+        TrialState.FAIL,
+        TrialState.COMPLETE,
+    ]
+    assert unfinished.number == 2
+    assert trials[1].params == killed.params
+    # Checkpoints are for going on only.
+    assert not list(search.path.glob("trials/*/checkpoints"))
+
+
+def test_a_training_that_is_not_finite_is_a_failure(tmp_path, monkeypatch, capsys):
+    search = Search.create(tmp_path / "search", tiny.config(tmp_path, "ppo", search=SPACE, steps=64))
+    monkeypatch.setattr(training, "rating", lambda score, measure: float("nan"))
+    assert not run(search, 1)
+    assert [row["state"] for row in rows(search)] == ["fail"]
+    assert "no validation of it is finite" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -25,13 +25,14 @@ _COMMON: dict[str, Any] = {
     "search": {"hyperparameters.gamma": {"choices": [0.9, 0.95]}},
 }
 _NET = {"policy_kwargs": {"net_arch": [8, 8]}}
+_GRADIENT = {"net_arch": [8]}
 _ON_POLICY = {"n_steps": 16, "batch_size": 32, **_NET}
 _OFF_POLICY = {"learning_starts": 60, "batch_size": 16, "buffer_size": 240, "gradient_steps": 1, **_NET}
 
 
 def values(algo: str, /, **fields: Any) -> dict[str, Any]:
     """Fields of a tiny configuration."""
-    hyperparameters = _ON_POLICY if algo == "ppo" else _OFF_POLICY
+    hyperparameters = {"ppo": _ON_POLICY, "apg": _GRADIENT}.get(algo, _OFF_POLICY)
     return merge({**_COMMON, "hyperparameters": hyperparameters}, fields)
 
 

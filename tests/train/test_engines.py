@@ -1,0 +1,179 @@
+"""Trainings in this process, in others, and on Ray: the same bits, whatever happens to a process."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
+from motion_cueing.train.agent import Agent
+from motion_cueing.train.checkpoint import checkpoints_in
+from motion_cueing.train.config import TrainingConfig
+from motion_cueing.train.engine import Engine, make_engine, ray_engine, run_jobs
+from motion_cueing.train.engine import processes as processes_engine
+from motion_cueing.train.engine.ray_engine import RayEngine
+from motion_cueing.train.training import Training
+from motion_cueing.train.training_job import TrainingJob
+
+from . import jobs
+
+ELSEWHERE = ("processes", "ray")
+
+
+@pytest.fixture(scope="module")
+def ray() -> Iterator[Engine]:
+    """Ray on this machine: it takes seconds to begin."""
+    with make_engine("ray", 2) as engine:
+        yield engine
+
+
+@pytest.fixture(scope="module")
+def processes() -> Iterator[Engine]:
+    with make_engine("local", 2) as engine:
+        yield engine
+
+
+@pytest.fixture
+def engine(request) -> Engine:
+    return request.getfixturevalue(request.param)
+
+
+elsewhere = pytest.mark.parametrize("engine", ELSEWHERE, indirect=True)
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory) -> TrainingConfig:
+    return jobs.config(tmp_path_factory.mktemp("config"))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(config, tmp_path_factory) -> list[TrainingJob]:
+    """Two seeds, one after the other in this process."""
+    trainings = jobs.seeds(tmp_path_factory.mktemp("local") / "runs", config, 2)
+    with make_engine("local") as engine:
+        endings, interrupted = run_jobs(engine, trainings, jobs.Heard())
+    assert not interrupted
+    assert [ending.error for ending in endings.values()] == [None, None]
+    return trainings
+
+
+def assert_same(found: list[TrainingJob], expected: list[TrainingJob]) -> None:
+    """The same agents bit for bit, the same validations, the same log."""
+    for one, other in zip(found, expected, strict=True):
+        for name in ("final", "best"):
+            agents = [Agent.load(job.path / f"{name}.safetensors") for job in (one, other)]
+            for a, b in zip(agents[0].network.weights, agents[1].network.weights, strict=True):
+                np.testing.assert_array_equal(a, b)
+            assert agents[0].record.validation == agents[1].record.validation
+        assert (one.path / "log.csv").read_text() == (other.path / "log.csv").read_text()
+
+
+@elsewhere
+def test_seeds_come_to_the_same_bits_as_in_one_process(engine, config, undisturbed, tmp_path):
+    trainings, heard = jobs.seeds(tmp_path / "runs", config, 2), jobs.Heard()
+    endings, interrupted = run_jobs(engine, trainings, heard)
+    assert not interrupted
+    assert [endings[job.name].result.status.steps for job in trainings] == [config.steps] * 2
+    assert {name: steps[-1] for name, steps in heard.statuses.items()} == dict.fromkeys(endings, config.steps)
+    assert_same(trainings, undisturbed)
+    first, second = (Agent.load(job.path / "final.safetensors").network.weights[0] for job in trainings)
+    assert not np.array_equal(first, second)
+
+
+@elsewhere
+def test_a_killed_process_loses_nothing(engine, config, undisturbed, tmp_path):
+    trainings = jobs.seeds(tmp_path / "runs", config, 1)
+    endings, _ = run_jobs(engine, [jobs.Mortal(trainings[0])], jobs.Heard())
+    outcome, taken_up = endings["seed-0"].result
+    assert outcome.status.steps == config.steps
+    # The process that died had left these.
+    assert taken_up == ["step-000000000120", "step-000000000240"]
+    assert_same(trainings, undisturbed[:1])
+
+
+@elsewhere
+def test_jobs_that_fail_say_why_and_others_go_on(engine, config, tmp_path, monkeypatch):
+    for module in (processes_engine, ray_engine):
+        monkeypatch.setattr(module, "RETRIES", 1)
+    mortal, whole = jobs.seeds(tmp_path / "runs", replace(config, steps=60), 2)
+    several = [jobs.Mortal(mortal, always=True), jobs.Failing("wrong", config), whole]
+    endings, interrupted = run_jobs(engine, several, jobs.Heard())
+    assert not interrupted
+    assert str(endings["seed-0"].error).startswith("its process died 2 times")
+    assert endings["wrong"].error == "one by nothing"
+    assert endings["seed-1"].error is None
+
+
+@elsewhere
+def test_ctrl_c_leaves_checkpoints_from_which_all_go_on(engine, config, undisturbed, tmp_path):
+    trainings = jobs.seeds(tmp_path / "runs", config, 2)
+    waiting = [jobs.Waiting(job) for job in trainings]
+    endings, interrupted = run_jobs(engine, waiting, jobs.Heard(press_after=2))
+    assert interrupted
+    assert [ending.result.interrupted for ending in endings.values()] == [True, True]
+    for job in trainings:
+        (*_, last) = checkpoints_in(job.path / "checkpoints")
+        assert last.stem == f"step-{config.steps // 2:012d}"
+    _, interrupted = run_jobs(engine, trainings, jobs.Heard())
+    assert not interrupted
+    assert_same(trainings, undisturbed)
+
+
+def test_ray_listens_on_loopback_only(ray):
+    import ray as library
+
+    assert isinstance(ray, RayEngine)
+    node = library.get_runtime_context().get_node_id()
+    (here,) = [found for found in library.nodes() if found["NodeID"] == node]
+    assert here["NodeManagerAddress"] == "127.0.0.1"
+    assert library.cluster_resources()["CPU"] == 2
+    assert os.environ["RAY_USAGE_STATS_ENABLED"] == "0"
+
+
+def test_a_training_asks_ray_for_what_it_needs(ray, config, monkeypatch):
+    asked = {}
+
+    class Task:
+        def options(self, **options):
+            asked.update(options)
+            return self
+
+        def remote(self, *arguments):
+            return None
+
+    monkeypatch.setattr(ray, "_perform", Task())
+    job = TrainingJob("seed-0", Path("somewhere"), replace(config, threads=64, device="cuda:0"))
+    ray._start(job)
+    # As many cores as there are, or it would wait for ever.
+    assert (asked["num_cpus"], asked["num_gpus"]) == (2.0, 1)
+    ray._start(replace(job, config=config))
+    assert (asked["num_cpus"], asked["num_gpus"]) == (1.0, 0)
+
+
+def test_a_folder_that_is_not_there_is_refused(config, tmp_path):
+    job = TrainingJob("seed-0", tmp_path / "elsewhere" / "seed-0", config)
+    with pytest.raises(DataError, match="on a disk that all machines share"):
+        job.run(lambda status: False)
+
+
+def test_what_is_missing_is_told(monkeypatch):
+    with pytest.raises(UnknownNameError, match=r"unknown engine 'rey'. Did you mean ray\?"):
+        make_engine("rey")
+    monkeypatch.setattr(ray_engine, "find_spec", lambda name: None)
+    with pytest.raises(ConfigurationError, match=r"needs ray: pip install 'motion-cueing-gym\[ray\]'"):
+        make_engine("ray")
+
+
+def test_an_unexpected_error_leaves_its_trace(config, tmp_path, monkeypatch):
+    def broken(training: Training) -> None:
+        raise ZeroDivisionError("one by nothing")
+
+    monkeypatch.setattr(Training, "train", broken)
+    with pytest.raises(ZeroDivisionError):
+        TrainingJob("seed-0", tmp_path / "seed-0", config).run(lambda status: False)
+    assert "in broken" in (tmp_path / "seed-0" / "error.txt").read_text()

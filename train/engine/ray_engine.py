@@ -1,0 +1,196 @@
+"""Jobs on Ray: on this machine, or on the machines of a cluster that share a disk.
+
+Jobs travel to the workers, their results back. What a training keeps (checkpoints, logs, agents) lies in
+files on a disk that all machines see. A job whose worker or machine died is begun again elsewhere by Ray, and
+goes on from its last checkpoint.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+from ...envs.errors import ConfigurationError, DataError
+from ..interrupt import Interrupt
+from ..training import Status
+from .job import RETRIES, Ending, Job, Listener, Source, ending_of
+
+_PATIENCE: Final = 0.2
+"""Time between looks at news and Ctrl-C, s."""
+_QUIET: Final = 0.5
+"""Least time between reports of a worker without news, s."""
+_STORE: Final = 128 * 2**20
+"""Memory for objects, bytes: only configurations and numbers travel. Ray would take a third of all."""
+_ENVIRONMENT: Final = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    # Ray would send the working folder of `uv run` to the workers.
+    "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
+    # Workers without a GPU are left alone.
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+}
+_LOOPBACK: Final = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+"""Ray listens on 127.0.0.1 alone, as it does on Windows and macOS by default."""
+
+
+class RayEngine:
+    """See :class:`~.job.Engine`.
+
+    Args:
+        jobs: At a time; default: one a core.
+        address: HOST:PORT of a cluster, of which this machine is a node; default: this machine alone.
+
+    Raises:
+        ConfigurationError: Ray is not installed.
+    """
+
+    def __init__(self, jobs: int | None = None, address: str | None = None) -> None:
+        if find_spec("ray") is None:
+            raise ConfigurationError("--engine ray needs ray: pip install 'motion-cueing-gym[ray]'")
+        self._jobs, self._address = jobs, address
+        self._folder: str | None = None
+
+    def __enter__(self) -> RayEngine:
+        """Start Ray, or join the cluster.
+
+        Raises:
+            DataError: there is no cluster at the address.
+        """
+        os.environ.update(_ENVIRONMENT if self._address else {**_ENVIRONMENT, **_LOOPBACK})
+        import ray
+
+        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
+        if self._address:
+            try:
+                ray.init(address=self._address, **quiet)
+            except (ConnectionError, ValueError, RuntimeError) as error:
+                reason = " ".join(str(error).split())
+                raise DataError(f"--address {self._address}: no Ray cluster answers ({reason})") from None
+        else:
+            # Sockets lie in it, whose paths must be short; session logs, too, which nobody reads afterwards.
+            self._folder = tempfile.mkdtemp(prefix="ray-")
+            ray.init(
+                num_cpus=self._jobs,
+                include_dashboard=False,
+                object_store_memory=_STORE,
+                _temp_dir=self._folder,
+                **quiet,
+            )
+        self._begin(ray)
+        return self
+
+    def _begin(self, ray: Any) -> None:
+        self._ray, here = ray, ray.get_runtime_context().get_node_id()
+        nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
+        self._largest = max(float(node.get("CPU", 0.0)) for node in nodes)
+        near = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(here, soft=False)
+        desk = ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=near)(Desk)
+        self._desk = desk.remote()
+        self._perform = ray.remote(_perform)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop Ray, or leave the cluster; jobs that still run end at once."""
+        self._ray.shutdown()
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    @property
+    def slots(self) -> int:
+        """Jobs at a time; a cluster may grow."""
+        return self._jobs or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+
+    def run(self, source: Source, listener: Listener) -> bool:
+        """Run jobs until there are none; returns whether Ctrl-C stopped them."""
+        interrupt = Interrupt()
+        running: dict[Any, Job] = {}
+        with interrupt.caught():
+            while True:
+                while not interrupt.asked and len(running) < self.slots and (job := source()) is not None:
+                    running[self._start(job)] = job
+                if not running:
+                    return interrupt.asked
+                done, _ = self._ray.wait(list(running), timeout=_PATIENCE)
+                self._pass_on({job.name: job for job in running.values()}, listener, interrupt.asked)
+                for place in done:
+                    listener.ended(running.pop(place), self._ending(place))
+
+    def _start(self, job: Job) -> Any:
+        cores = min(float(job.config.threads), self._largest)
+        needs = {"num_cpus": cores, "num_gpus": int(job.config.device != "cpu")}
+        task = self._perform.options(name=job.name, max_retries=RETRIES, **needs)
+        return task.remote(job, self._desk, sys.argv, os.getcwd())
+
+    def _pass_on(self, jobs: dict[str, Job], listener: Listener, stop: bool) -> None:
+        """News from the desk to the listener, and back whether to stop."""
+        try:
+            news = self._ray.get(self._desk.hear.remote(stop))
+        except self._ray.exceptions.RayActorError:
+            # Its process died; Ray begins another.
+            return
+        for name, status in news:
+            if name in jobs:
+                listener.told(jobs[name], status)
+
+    def _ending(self, place: Any) -> Ending:
+        try:
+            ending: Ending = self._ray.get(place)
+        except self._ray.exceptions.WorkerCrashedError:
+            return Ending(error=f"its process died {RETRIES + 1} times")
+        except self._ray.exceptions.RayError as error:
+            return Ending(error=" ".join(str(error).split()))
+        return ending
+
+
+class Desk:
+    """Between workers and the process that began them: news one way, whether to stop the other."""
+
+    def __init__(self) -> None:
+        self._news: list[tuple[str, Status]] = []
+        self._stop = False
+
+    def tell(self, name: str, status: Status) -> bool:
+        """Leave news; returns whether to stop."""
+        self._news.append((name, status))
+        return self._stop
+
+    def hear(self, stop: bool) -> list[tuple[str, Status]]:
+        """Take the news."""
+        news, self._news, self._stop = self._news, [], stop
+        return news
+
+
+def _perform(job: Job, desk: Any, arguments: list[str], folder: str) -> Ending:
+    """A job in a worker, which stands in for the process that sent it."""
+    sys.argv = arguments
+    if Path(folder).is_dir():
+        os.chdir(folder)
+    return ending_of(job, _Report(job.name, desk))
+
+
+class _Report:
+    """See :data:`~.job.Report`."""
+
+    def __init__(self, name: str, desk: Any) -> None:
+        self._name, self._desk = name, desk
+        self._last = -_QUIET
+
+    def __call__(self, status: Status) -> bool:
+        import ray
+
+        now = time.monotonic()
+        if now - self._last < _QUIET and not status.news:
+            return False
+        self._last = now
+        try:
+            return bool(ray.get(self._desk.tell.remote(self._name, status)))
+        except ray.exceptions.RayActorError:
+            # Nobody at the desk for a moment; the training goes on.
+            return False
