@@ -119,7 +119,7 @@ class Controller:
         """
         before = self.state
         self.state = next_state(before, self._situation(now), self._patience)
-        if before in _FOLLOWED and self.state is State.BRAKING:
+        if self.state not in _FOLLOWED and self.inbox.age(now) > self._patience.hold:
             self.inbox.renew()
         if before not in _FOLLOWED and self.state in _FOLLOWED:
             self._began = len(self.log)

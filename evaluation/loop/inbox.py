@@ -18,8 +18,8 @@ _LARGEST_FORCE: Final = 1000.0
 """More than any car does, m/s^2; the same for a file of cues."""
 _LARGEST_RATE: Final = 100.0
 """More than any car does, rad/s."""
-_LARGEST_LEAP: Final = 1_000_000
-"""Packets that may be lost in one go."""
+_LARGEST_LEAP: Final = 10_000
+"""Packets that may be lost in one go: 10 s of them, and far less silence renews the whole."""
 _DRIFT: Final = 1e-3
 """How much faster one clock may run than the other."""
 

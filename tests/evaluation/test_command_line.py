@@ -239,7 +239,7 @@ IMPORT = ("import", "log.csv", "--column", "time=t", "--out", "cues.csv")
 @pytest.mark.parametrize(
     ("argv", "told"),
     [
-        (["evalute"], "unknown command 'evalute'. Did you mean evaluate?"),
+        (["evalute"], "unknown command 'evalute'. Did you mean evaluate or serve?"),
         (["evaluate", "--polcy", "x"], "Did you mean --policy?"),
         (["evaluate", "--out"], "--out"),
         (["evaluate", "stray"], "stray"),
