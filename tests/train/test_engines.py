@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +12,18 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
+from motion_cueing.envs.settings import save
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.train import studies
 from motion_cueing.train.agent import Agent
 from motion_cueing.train.checkpoint import checkpoints_in
-from motion_cueing.train.config import TrainingConfig
+from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
 from motion_cueing.train.engine import Engine, make_engine, ray_engine, run_jobs
 from motion_cueing.train.engine import processes as processes_engine
+from motion_cueing.train.engine.local import LocalEngine
 from motion_cueing.train.engine.ray_engine import RayEngine
+from motion_cueing.train.population import Population
+from motion_cueing.train.search import Search
 from motion_cueing.train.training import Training
 from motion_cueing.train.training_job import TrainingJob
 
@@ -177,3 +184,40 @@ def test_an_unexpected_error_leaves_its_trace(config, tmp_path, monkeypatch):
     with pytest.raises(ZeroDivisionError):
         TrainingJob("seed-0", tmp_path / "seed-0", config).run(lambda status: False)
     assert "in broken" in (tmp_path / "seed-0" / "error.txt").read_text()
+
+
+def test_a_population_comes_to_the_same_bits(ray, config, tmp_path):
+    varied = {"hyperparameters.learning_rate": Choice(low=1e-4, high=1e-2, log=True)}
+    config = replace(config, steps=480, search=varied, population=PopulationOptions(members=2))
+    found = []
+    for name, engine in (("local", LocalEngine()), ("ray", ray)):
+        population = Population.create(tmp_path / name, config)
+        assert not population.run(engine, jobs.Heard())
+        found.append(population)
+    assert found[0].generations == found[1].generations
+    one, other = (Agent.load(population.best_agent).network for population in found)
+    for a, b in zip(one.weights, other.weights, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_search_comes_to_the_same_results(ray, config, tmp_path):
+    varied = {"hyperparameters.learning_rate": Choice(low=1e-4, high=1e-2, log=True)}
+    config, tables = replace(config, steps=240, search=varied), []
+    for name, engine in (("local", LocalEngine()), ("ray", ray)):
+        search = Search.create(tmp_path / name, config)
+        assert not search.run(2, engine, jobs.Heard())
+        tables.append((search.path / "results.csv").read_text())
+    assert tables[0] == tables[1]
+    assert tables[0].count("complete") == 2
+
+
+def test_a_single_training_runs_on_ray(ray, config, undisturbed, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(studies, "make_engine", lambda *place: nullcontext(ray))
+    save(config, tmp_path / "config.yaml")
+    out = tmp_path / "runs" / "one"
+    words = ["train", "--config", str(tmp_path / "config.yaml"), "--engine", "ray"]
+    assert main([*words, "--out", str(out)]) == 0
+    told = capsys.readouterr()
+    assert f"final.safetensors: the agent after {config.steps:,} steps" in told.out
+    assert told.err.count(" steps  J ") == 4
+    assert_same([TrainingJob("one", out, config)], undisturbed[:1])
