@@ -73,7 +73,7 @@ class LoopLog:
         player = _Player(table, platform, vestibular)
         cues = player.simulator.drives[0]
         trajectory = trajectory_of(record(player, start), player, policy, cues, None)
-        steps = {f"steps {state.name.lower()}": str(int((self.states == state).sum())) for state in State}
+        steps = {f"loop_{state.name.lower()}": str(int((self.states == state).sum())) for state in State}
         return replace(trajectory, metadata={**trajectory.metadata, **steps})
 
     def _table(self) -> Floats:

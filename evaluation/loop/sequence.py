@@ -34,14 +34,14 @@ class SequenceWindow:
 
     def __init__(self, leap: int) -> None:
         self._leap = leap
-        self._newest: int | None = None
+        self._first, self._newest = 0, -1
         self._seen = 0
         self.lost = 0
 
     def put(self, number: int) -> Place:
         """Say where a number stands, and remember it."""
-        if self._newest is None:
-            self._newest, self._seen = number, 1
+        if self._newest < 0:
+            self._first, self._newest, self._seen = number, number, 1
             return Place.NEW
         ahead = number - self._newest
         if ahead > self._leap:
@@ -51,14 +51,14 @@ class SequenceWindow:
             self._seen = ((self._seen << ahead) | 1) & (2**_WIDTH - 1) if ahead < _WIDTH else 1
             self.lost += ahead - 1
             return Place.NEW
-        return self._behind(-ahead)
+        return self._behind(number, -ahead)
 
-    def _behind(self, behind: int) -> Place:
+    def _behind(self, number: int, behind: int) -> Place:
         if behind >= _WIDTH:
             return Place.LATE
         if self._seen >> behind & 1:
             return Place.REPEATED
         self._seen |= 1 << behind
         # Numbers before the first that came were not passed over.
-        self.lost = max(self.lost - 1, 0)
+        self.lost -= number > self._first
         return Place.LATE

@@ -25,6 +25,7 @@ class Server:
         form: How set-points are written.
         rate: Periods a second.
         lead: How long before its first period a time step is decided, s.
+        clock: Nanoseconds now, as of the endpoint.
 
     Attributes:
         timings: By name: "latency" from the arrival of cues until the first set-point they moved is sent;
@@ -35,13 +36,20 @@ class Server:
     """
 
     def __init__(
-        self, controller: Controller, endpoint: Endpoint, form: Format, rate: int, lead: float
+        self,
+        controller: Controller,
+        endpoint: Endpoint,
+        form: Format,
+        rate: int,
+        lead: float,
+        clock: Callable[[], int] = time.perf_counter_ns,
     ) -> None:
         self._controller, self._endpoint, self._form, self._rate = controller, endpoint, form, rate
+        self._clock = clock
         self._lead = round(1e9 * min(lead, 1.0 / rate))
         names = ("latency", "wake", "interval", "period", "decision")
         self.timings = {name: Histogram() for name in names}
-        self.pace = Pace(rate)
+        self.pace = Pace(rate, clock)
         self.duration = 0.0
         self._sent = 0
         self._answered = NO_SEQUENCE
@@ -52,8 +60,8 @@ class Server:
         Args:
             ends: Given the seconds since the begin, before each step: whether it is to be stopped.
         """
-        controller, clock = self._controller, time.perf_counter_ns
-        self.pace = pace = Pace(self._rate)
+        controller, clock = self._controller, self._clock
+        self.pace = pace = Pace(self._rate, clock)
         begin = clock()
         while not controller.finished:
             if controller.decides:
@@ -67,20 +75,20 @@ class Server:
         self.duration = _NS * (clock() - begin)
 
     def _decide(self) -> None:
-        began = time.perf_counter_ns()
+        began = self._clock()
         self._controller.decide(_NS * began)
-        self.timings["decision"].add(time.perf_counter_ns() - began)
+        self.timings["decision"].add(self._clock() - began)
 
     def _take(self, data: bytes, sender: Address, now: int) -> None:
         self._controller.inbox.take(data, sender, _NS * now)
 
     def _period(self, deadline: int) -> None:
-        began = time.perf_counter_ns()
+        began = self._clock()
         setpoint = self._controller.period(_NS * began)
         sender = self._controller.inbox.sender
         if sender is not None:
             self._endpoint.send(self._form.pack_setpoint(setpoint), sender)
-        sent = time.perf_counter_ns()
+        sent = self._clock()
         timings = self.timings
         timings["wake"].add(began - deadline)
         timings["period"].add(sent - began)

@@ -1,0 +1,230 @@
+"""``serve`` and ``drive`` over the loopback, and what both refuse."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+
+import numpy as np
+import pytest
+
+from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.evaluation import Trajectory
+from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.loop.client import Client, cues_at
+from motion_cueing.evaluation.loop.endpoint import Endpoint, address_of, is_loopback
+from motion_cueing.evaluation.loop.limit_check import LimitCheck
+from motion_cueing.evaluation.loop.packets import Cues, SetPoint
+from motion_cueing.evaluation.loop.report import SCHEMA, LoopReport
+from motion_cueing.evaluation.loop.trouble import Trouble
+from motion_cueing.evaluation.loop.watchdog import State
+from motion_cueing.evaluation.results import Results
+from motion_cueing.evaluation.saved import load_json
+
+from .loops import FLOATS, PAPER, lane_change
+
+GENTLE = ["--overdue", "2", "--hold", "3", "--stale", "2", "--steady", "0", "--rate", "100"]
+"""So that a machine that is slow for a moment fails nothing."""
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@pytest.mark.parametrize("form", ["floats", "msgpack"])
+def test_a_drive_over_the_loopback_leaves_log_and_report(form, tmp_path, capsys):
+    cues, port = tmp_path / "lane.csv", str(free_port())
+    lane_change(1.0).to_csv(cues)
+    log, told = tmp_path / "log.npz", tmp_path / "told.json"
+    serve = ["serve", "--policy", "classical", "--port", port, "--format", form, "--duration", "2", *GENTLE]
+    server = threading.Thread(target=main, args=([*serve, "--log", str(log), "--report", str(told)],))
+    server.start()
+    drive = ["drive", "--maneuver", str(cues), "--to", f"127.0.0.1:{port}", "--format", form, "--rate", "100"]
+    status, tries = 1, 0
+    # Until the controller listens, nothing comes back.
+    while status and tries < 20:
+        status = main([*drive, "--after", "0.1", "--report", str(tmp_path / "drive.json")])
+        tries += 1
+    server.join()
+    assert status == 0
+    served = load_json(LoopReport, told, "a report", SCHEMA)
+    driven = load_json(LoopReport, tmp_path / "drive.json", "a report", SCHEMA)
+    assert served.packets["used"] >= 1
+    assert served.steps["running"] > 0
+    assert driven.packets["received"] > 0
+    assert driven.packets["malformed"] == driven.packets["outside_limits"] == 0
+    assert served.timings["period"].count == served.periods
+    assert f"UDP 127.0.0.1:{port}" in capsys.readouterr().out
+    drive_again = Trajectory.load(log)
+    assert len(drive_again) == sum(served.steps.values())
+    assert np.abs(drive_again.f_wanted[:, 1]).max() > 0.1
+    assert main(["evaluate", "--replay", str(log), "--out", str(tmp_path / "out")]) == 0
+    results = Results.load_json(tmp_path / "out" / "results.json")
+    assert list(results.maneuvers["log"]) == ["driven"]
+    assert results.maneuvers["log"]["driven"].cue_error > 0.0
+
+
+def test_a_replay_needs_its_own_machine_and_cues(tmp_path, capsys):
+    from .loops import Bench
+
+    bench = Bench()
+    bench.calm(0.1)
+    bench.trajectory().save(tmp_path / "log.npz")
+    for extra, told in (
+        [["--maneuver", "braking"], "leave --maneuver out"],
+        [["--platform", "nads-1"], "'paper'"],
+    ):
+        words = ["evaluate", "--replay", str(tmp_path / "log.npz"), "--out", str(tmp_path / "out"), *extra]
+        assert main(words) == 2
+        assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--policy", "optimum"], "must know the drive before it begins"),
+        (["--policy", "clasical"], "Did you mean classical"),
+        (["--policy", "no-motion", "--rate", "150"], "multiple of 100"),
+        (["--duration", "0"], "--duration must be positive"),
+        (["--lead", "-1"], "--lead must not be negative"),
+        (["--log", "log.csv"], "ends in .npz"),
+        (["--policy", "no-motion", "--host", "203.0.113.7"], "cannot be listened at"),
+        (["--policy", "no-motion", "--port", "99999"], "at most 65535"),
+        (["--policy", "no-motion", "--peer", "127.0.0.1:x"], "a port is a number"),
+        (["--policy", "no-motion", "--hold", "0.01"], "hold must not be less than overdue"),
+        (["--policy", "no-motion", "--priority", "1000", "--port", "0"], "refuses"),
+    ],
+)
+def test_serve_refuses_in_one_line(words, told, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["serve", *words]) == 2
+    complaint = capsys.readouterr().err
+    assert told in complaint
+    assert complaint.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--to", "127.0.0.1:70000"], "at most 65535"),
+        (["--to", "no such host"], "there is no host"),
+        (["--drop", "1.5"], "--drop must be a share"),
+        (["--times", "0"], "--times must be at least 1"),
+        (["--maneuver", "all"], "means several drives"),
+    ],
+)
+def test_drive_refuses_in_one_line(words, told, capsys):
+    assert main(["drive", *words]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_drive_fails_where_nobody_answers(tmp_path, capsys):
+    lane_change(0.1).to_csv(tmp_path / "lane.csv")
+    words = ["drive", "--maneuver", str(tmp_path / "lane.csv"), "--to", f"127.0.0.1:{free_port()}"]
+    assert main([*words, "--rate", "100", "--after", "0"]) == 1
+    assert "packets: none" in capsys.readouterr().out
+
+
+def test_beyond_this_machine_is_announced(capsys):
+    port = str(free_port())
+    for extra, told in ([[], "whoever sends first"], [["--peer", "127.0.0.1"], "only 127.0.0.1 moves it"]):
+        words = ["serve", "--policy", "no-motion", "--host", "0.0.0.0", "--port", port, "--duration", "0.001"]
+        assert main([*words, *extra]) == 0
+        assert told in capsys.readouterr().out
+    assert is_loopback(("127.0.0.1", 1))
+    assert not is_loopback(("0.0.0.0", 1))
+
+
+def test_addresses():
+    assert address_of("127.0.0.1", 5) == ("127.0.0.1", 5)
+    assert address_of("127.0.0.1:6", 5) == ("127.0.0.1", 6)
+    with pytest.raises(ConfigurationError):
+        address_of("127.0.0.1:", 5)
+    with pytest.raises(UnknownNameError):
+        get_platform("papier")
+
+
+def sent(trouble, count=2000):
+    out = [
+        [packet.sequence for packet in trouble.sent(Cues(k, 0.0, (0, 0, 0), (0, 0, 0)), k / 1000)]
+        for k in range(count)
+    ]
+    return [number for numbers in out for number in numbers]
+
+
+def test_trouble_is_what_was_asked_for():
+    assert sent(Trouble(0, 0, 0, 0, 0)) == list(range(2000))
+    dropped = sent(Trouble(0.1, 0, 0, 0, 0))
+    assert 1700 < len(dropped) < 1900
+    assert dropped == sorted(set(dropped))
+    repeated = sent(Trouble(0, 0.1, 0, 0, 0))
+    assert len(repeated) - len(set(repeated)) == pytest.approx(200, abs=50)
+    late = sent(Trouble(0, 0, 0.1, 0, 0))
+    assert late != sorted(late)
+    assert set(range(1900)) <= set(late)
+    assert sent(Trouble(0.1, 0.1, 0.1, 0.1, 5)) == sent(Trouble(0.1, 0.1, 0.1, 0.1, 5))
+    broken = Trouble(0, 0, 0, 1.0, 0)
+    (packet,) = broken.sent(Cues(0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0.0)
+    assert np.isnan(packet.force[0])
+
+
+def test_cues_are_sent_over_and_over_at_the_rate():
+    trace = lane_change(0.5)
+    found = list(cues_at(trace, 200, 2))
+    assert len(found) == 2 * len(trace.resampled(0.005))
+    assert [cues.sequence for cues in found] == list(range(len(found)))
+    np.testing.assert_allclose(found[0].force, trace.specific_force[0])
+    assert found[len(found) // 2].force == found[0].force
+    np.testing.assert_allclose(found[1].force, 0.5 * (trace.specific_force[0] + trace.specific_force[1]))
+
+
+def still(sequence, **parts) -> SetPoint:
+    motion = np.zeros(39)
+    for where, value in parts.values():
+        motion[where] = value
+    return SetPoint(State.RUNNING, sequence, 0, 0.0, 0.0, 0.0, motion)
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "told"),
+    [
+        (0, 1e3, "position limit of carriage_x"),
+        (27, 1e3, "position limit of leg_1"),
+        (17, 1e3, "velocity limit of turntable"),
+        (38, -1e3, "velocity limit of leg_6"),
+        (10, 0.1, "acceleration limit of carriage_y"),
+        (5, np.nan, "not finite"),
+    ],
+)
+def test_what_exceeds_a_limit_is_told(where, value, told):
+    check = LimitCheck(PAPER, 1000)
+    assert check(still(0)) == ""
+    assert told in check(still(1, one=(where, value)))
+
+
+def test_the_client_counts_what_is_wrong():
+    here, there = Endpoint(("127.0.0.1", 0)), Endpoint(("127.0.0.1", 0))
+    client = Client(here, there.address, FLOATS, PAPER, 1000, Trouble(0, 0, 0, 0, 0))
+    for setpoint in (still(0), still(1), still(4), still(2), still(5, one=(0, 1e3))):
+        there.send(FLOATS.pack_setpoint(setpoint), here.address)
+    there.send(b"noise", here.address)
+    here.send(FLOATS.pack_setpoint(still(6)), here.address)
+    client.listen(0.0)
+    assert client.counts == {
+        "received": 5, "malformed": 1, "foreign": 1, "missing": 2, "disordered": 1, "outside_limits": 1,
+    }  # fmt: skip
+    assert client.faults == ["set-point 5 exceeds the position limit of carriage_x"]
+    here.close()
+    there.close()
+
+
+def test_a_report_is_json_of_its_version(tmp_path):
+    words = ["serve", "--policy", "no-motion", "--port", "0", "--duration", "0.001", "--report"]
+    assert main([*words, str(tmp_path / "r.json")]) == 0
+    values = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+    assert values["schema"] == SCHEMA
+    assert values["command"].startswith("motion-cueing serve --policy no-motion")

@@ -1,0 +1,156 @@
+"""A policy in the loop moves the machine as it does in a rollout, to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motion_cueing.baselines import ClassicalWashout
+from motion_cueing.baselines.washout import ScheduledWashout
+from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
+from motion_cueing.envs.task.layout import layout_of
+from motion_cueing.evaluation import rollout
+from motion_cueing.evaluation.loop import State, make_machine
+from motion_cueing.evaluation.loop.endpoint import Endpoint
+from motion_cueing.evaluation.loop.packets import Cues
+from motion_cueing.evaluation.policies import make_policy
+
+from .loops import FLOATS, PAPER, Bench, lane_change
+
+TRACE = lane_change()
+
+
+class Feedback:
+    """Tanh of a random matrix times the observation, with a leaky memory: whatever it sees counts."""
+
+    def __init__(self, task, base_policy=None, size=9) -> None:
+        self.task, self.base_policy = task, base_policy
+        columns = layout_of(task.observation, task.action.mode, size).size
+        self.weights = np.random.default_rng(3).normal(size=(size, columns)) / columns**0.5
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        memory = np.zeros(observation.shape) if state is None else state
+        memory = 0.9 * memory + 0.1 * observation
+        return 0.5 * np.tanh((observation + memory) @ self.weights.T), memory
+
+
+def axes_of(trajectory) -> np.ndarray:
+    return np.hstack([trajectory.carriage, trajectory.hexapod, trajectory.turntable[:, None]])
+
+
+def assert_same_motion(bench: Bench, sent: np.ndarray, expected) -> None:
+    """The set-points are those of a rollout, one sample later; and the log tells the same drive."""
+    assert not bench.controller.faults
+    last = len(sent) - bench.machine.ahead_steps - 1
+    np.testing.assert_array_equal(sent[:last, :9], axes_of(expected)[1 : last + 1])
+    np.testing.assert_array_equal(sent[:last, 27:33], expected.legs[1 : last + 1])
+    assert np.abs(axes_of(expected)).max() > 0.01
+    logged = bench.trajectory()
+    for name in ("carriage", "hexapod", "turntable", "f_felt", "w_felt", "f_wanted", "w_wanted"):
+        np.testing.assert_allclose(getattr(logged, name)[:last], getattr(expected, name)[:last], atol=1e-12)
+
+
+TASKS = {
+    "plain": {},
+    "memory": {"observation": ObservationOptions(memory=(0.5, 3.0), frame="cab")},
+    "stack": {"observation": ObservationOptions(stack=3)},
+    "true motion": {"observation": ObservationOptions(true_motion=True)},
+    "jerk, held": {"action": ActionOptions(mode="jerk", repeat=3)},
+    "velocity in the cab": {"action": ActionOptions(mode="velocity", frame="cab")},
+}
+
+
+@pytest.mark.parametrize("rate", [100, 300])
+def test_a_washout(rate):
+    bench = Bench(ClassicalWashout(), rate=rate)
+    sent = bench.drive(TRACE)
+    assert_same_motion(bench, sent, rollout(ClassicalWashout(), TRACE))
+    assert {setpoint.state for setpoint in bench.made} == {State.RUNNING}
+
+
+@pytest.mark.parametrize("options", TASKS.values(), ids=TASKS)
+def test_a_policy_of_an_environment(options):
+    policy = Feedback(TaskOptions(**options))
+    bench = Bench(policy)
+    assert_same_motion(bench, bench.drive(TRACE), rollout(policy, TRACE))
+
+
+@pytest.mark.parametrize("repeat", [1, 3])
+@pytest.mark.parametrize(
+    ("mode", "base", "size"), [("residual", ClassicalWashout, 9), ("gains", ScheduledWashout, 7)]
+)
+def test_a_policy_on_a_washout(mode, base, size, repeat):
+    size = len(ScheduledWashout().gain_names) if mode == "gains" else size
+    policy = Feedback(TaskOptions(action=ActionOptions(mode=mode, repeat=repeat)), base(), size)
+    bench = Bench(policy)
+    assert_same_motion(bench, bench.drive(TRACE), rollout(policy, TRACE))
+
+
+def test_a_policy_with_preview_sees_the_newest_cues_that_far_ahead():
+    policy = Feedback(TaskOptions(observation=ObservationOptions(preview=3, preview_spacing=0.2)))
+    bench = Bench(policy)
+    assert bench.machine.ahead_steps == 60
+    sent = bench.drive(TRACE)
+    # What is felt now is what came 0.6 s ago; before the first packet the car stood.
+    force = np.vstack([np.tile([0.0, 0.0, -9.81], (60, 1)), TRACE.specific_force])
+    rate = np.vstack([np.zeros((60, 3)), TRACE.angular_velocity])
+    later = CueTrace("later", 0.01 * np.arange(len(force)), force, rate)
+    assert_same_motion(bench, sent, rollout(policy, later))
+
+
+def test_a_machine_that_lags():
+    lagging = replace(
+        PAPER, carriage=replace(PAPER.carriage, dynamics=PAPER.carriage.dynamics.__class__(20.0, 1.0, 0.03))
+    )
+    bench = Bench(ClassicalWashout(), platform=lagging)
+    expected = rollout(ClassicalWashout(), TRACE, lagging)
+    # Set-points are sent; the machine follows them.
+    np.testing.assert_array_equal(bench.drive(TRACE)[:-1, 2:8], expected.hexapod[1:])
+    assert np.abs(bench.made[-2].motion[:2] - expected.carriage[-1]).max() > 1e-3
+    logged = bench.controller.log.trajectory(lagging, bench.machine.start, "zacharias", bench.policy)
+    np.testing.assert_allclose(logged.carriage, expected.carriage, atol=1e-12)
+
+
+def test_the_shipped_agents_and_cues_over_the_network():
+    policy = make_policy("learned-preview", PAPER)
+    bench, expected = Bench(policy), Bench(policy).drive(TRACE)
+    here, there = Endpoint(("127.0.0.1", 0)), Endpoint(("127.0.0.1", 0))
+    received: list[bytes] = []
+    inbox = bench.controller.inbox
+    for k, (force, rate) in enumerate(zip(TRACE.specific_force, TRACE.angular_velocity, strict=True)):
+        there.send(FLOATS.pack_cues(Cues(k, bench.now, tuple(force), tuple(rate))), here.address)
+        here.listen(0, lambda data, sender, _: inbox.take(data, sender, bench.now))
+        here.send(FLOATS.pack_setpoint(bench.step()), inbox.sender)
+        there.listen(0, lambda data, sender, _: received.append(data))
+    assert inbox.counts["used"] == len(received) == len(TRACE)
+    np.testing.assert_array_equal([FLOATS.unpack_setpoint(data).motion for data in received], expected)
+    here.close()
+    there.close()
+
+
+def test_policies_that_cannot_be_served_are_refused():
+    class Foreknowing:
+        name = "seer"
+
+        def for_drive(self, cues):
+            return ClassicalWashout()
+
+    class Broken:
+        name = "broken"
+
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            raise RuntimeError("no")
+
+    for policy, told in [
+        (Foreknowing(), "seer must know the drive"),
+        (Broken(), "broken fails with a car that stands: RuntimeError: no"),
+        (ClassicalWashout(dt=0.02), "time step"),
+        (Feedback(TaskOptions(platform="nads-1")), "made for the motion base"),
+    ]:
+        with pytest.raises(ConfigurationError, match=told):
+            make_machine(policy, get_platform("paper"))
