@@ -7,13 +7,13 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import TaskID
 
-from .engine import Ending, Job
+from .engine.job import Ending, Job
 from .progress import line_of, make_bars, move
 from .training import Status
 
 
 class FleetProgress:
-    """See :class:`~.engine.Listener`.
+    """See :class:`~.engine.job.Listener`.
 
     Args:
         console: Where to write; default: the error stream.

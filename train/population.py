@@ -22,7 +22,7 @@ from ..envs.errors import ConfigurationError, DataError
 from ..envs.settings import load, save
 from ..envs.storage import write_text
 from .config import TrainingConfig
-from .engine import Ending, Engine, Listener, run_jobs
+from .engine.job import Ending, Engine, Listener, run_jobs
 from .run import RunFolder, free_folder
 from .selection import draw, next_generation
 from .space import check_space, varied

@@ -17,7 +17,7 @@ from ..envs.errors import DataError
 from ..envs.settings import load, save
 from ..envs.storage import write_text
 from .config import Choice, TrainingConfig
-from .engine import Ending, Engine, Job, Listener
+from .engine.job import Ending, Engine, Job, Listener
 from .run import free_folder
 from .space import check_space, varied
 from .training import Status

@@ -15,7 +15,7 @@ from ..envs.settings import configuration, load, save
 from ..envs.storage import write_text
 from ..envs.task.options import PositiveCount
 from .config import TrainingConfig
-from .engine import Ending, Engine, Listener, run_jobs
+from .engine.job import Ending, Engine, Listener, run_jobs
 from .run import free_folder
 from .training_job import TrainingJob
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Final
 
 from ..envs.errors import DataError
-from .engine import Engine, make_engine, run_jobs
+from .engine.choose import make_engine
+from .engine.job import Engine, run_jobs
 from .fleet_progress import FleetProgress
 from .population import Population, is_population
 from .run import RunFolder

@@ -13,7 +13,7 @@ from ..envs.errors import DataError, MotionCueingError
 from ..envs.storage import replacing, write_text
 from .checkpoint import checkpoints_in
 from .config import TrainingConfig
-from .engine import Report
+from .engine.job import Report
 from .interrupt import Interrupt
 from .logs import LOG
 from .run import RunFolder

@@ -14,7 +14,7 @@ from optuna.storages.journal import JournalFileBackend
 
 from ..envs.errors import DataError
 from .config import TrainingConfig
-from .engine import Report
+from .engine.job import Report
 from .training import Status, rating
 from .training_job import TrainingJob
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from motion_cueing.train.checkpoint import checkpoints_in
 from motion_cueing.train.config import TrainingConfig
-from motion_cueing.train.engine import Ending, Job, Report
+from motion_cueing.train.engine.job import Ending, Job, Report
 from motion_cueing.train.training import Status
 from motion_cueing.train.training_job import TrainingJob
 

@@ -18,8 +18,10 @@ from motion_cueing.train import studies
 from motion_cueing.train.agent import Agent
 from motion_cueing.train.checkpoint import checkpoints_in
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
-from motion_cueing.train.engine import Engine, make_engine, ray_engine, run_jobs
 from motion_cueing.train.engine import processes as processes_engine
+from motion_cueing.train.engine import ray_engine
+from motion_cueing.train.engine.choose import make_engine
+from motion_cueing.train.engine.job import Engine, run_jobs
 from motion_cueing.train.engine.local import LocalEngine
 from motion_cueing.train.engine.ray_engine import RayEngine
 from motion_cueing.train.population import Population
@@ -101,19 +103,6 @@ def test_a_killed_process_loses_nothing(engine, config, undisturbed, tmp_path):
     # The process that died had left these.
     assert taken_up == ["step-000000000120", "step-000000000240"]
     assert_same(trainings, undisturbed[:1])
-
-
-@elsewhere
-def test_jobs_that_fail_say_why_and_others_go_on(engine, config, tmp_path, monkeypatch):
-    for module in (processes_engine, ray_engine):
-        monkeypatch.setattr(module, "RETRIES", 1)
-    mortal, whole = jobs.seeds(tmp_path / "runs", replace(config, steps=60), 2)
-    several = [jobs.Mortal(mortal, always=True), jobs.Failing("wrong", config), whole]
-    endings, interrupted = run_jobs(engine, several, jobs.Heard())
-    assert not interrupted
-    assert str(endings["seed-0"].error).startswith("its process died 2 times")
-    assert endings["wrong"].error == "one by nothing"
-    assert endings["seed-1"].error is None
 
 
 @elsewhere
@@ -221,3 +210,16 @@ def test_a_single_training_runs_on_ray(ray, config, undisturbed, tmp_path, monke
     assert f"final.safetensors: the agent after {config.steps:,} steps" in told.out
     assert told.err.count(" steps  J ") == 4
     assert_same([TrainingJob("one", out, config)], undisturbed[:1])
+
+
+@elsewhere
+def test_jobs_that_fail_say_why_and_others_go_on(engine, config, tmp_path, monkeypatch):
+    for module in (processes_engine, ray_engine):
+        monkeypatch.setattr(module, "RETRIES", 0)
+    mortal, whole = jobs.seeds(tmp_path / "runs", replace(config, steps=60), 2)
+    several = [jobs.Mortal(mortal, always=True), jobs.Failing("wrong", config), whole]
+    endings, interrupted = run_jobs(engine, several, jobs.Heard())
+    assert not interrupted
+    assert str(endings["seed-0"].error).startswith("its process died 1 times")
+    assert endings["wrong"].error == "one by nothing"
+    assert endings["seed-1"].error is None

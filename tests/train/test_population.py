@@ -18,7 +18,7 @@ from motion_cueing.envs.settings import from_dict, load
 from motion_cueing.evaluation.command_line import main
 from motion_cueing.train.agent import Agent
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
-from motion_cueing.train.engine import make_engine
+from motion_cueing.train.engine.choose import make_engine
 from motion_cueing.train.fleet_progress import FleetProgress
 from motion_cueing.train.logs import read_log
 from motion_cueing.train.population import Population

@@ -16,7 +16,7 @@ from motion_cueing.evaluation.command_line import main
 from motion_cueing.train import training
 from motion_cueing.train.agent import Agent
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.engine import make_engine
+from motion_cueing.train.engine.choose import make_engine
 from motion_cueing.train.fleet_progress import FleetProgress
 from motion_cueing.train.search import Search, suggest
 from motion_cueing.train.training import Training

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from ..config import TrainingConfig
-from ..training import Status
+if TYPE_CHECKING:
+    from ..config import TrainingConfig
+    from ..training import Status
 
 RETRIES: Final = 3
 """How often a job is taken up again after its process died; chosen: one that always dies must end."""
 
-Report = Callable[[Status], bool]
+Report = Callable[["Status"], bool]
 """Shown the status at every boundary; answers whether to stop there, with a checkpoint."""
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from ..interrupt import Interrupt
-from ..training import Status
 from .job import Job, Listener, Source, ending_of
+
+if TYPE_CHECKING:
+    from ..training import Status
 
 
 class LocalEngine:

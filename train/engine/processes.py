@@ -8,11 +8,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from types import TracebackType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ..interrupt import Interrupt
-from ..training import Status
 from .job import RETRIES, Ending, Job, Listener, Source, ending_of
+
+if TYPE_CHECKING:
+    from ..training import Status
 
 _PATIENCE: Final = 0.2
 """Time between looks at Ctrl-C, s."""
@@ -109,24 +111,24 @@ class ProcessEngine:
         except (EOFError, OSError):
             self._replace(worker, job, listener)
             return
-        if isinstance(message, Status):
-            listener.told(job, message)
-        else:
+        if isinstance(message, Ending):
             worker.job = None
             listener.ended(job, message)
+        else:
+            listener.told(job, message)
 
     def _replace(self, worker: _Worker, job: Job, listener: Listener) -> None:
         """Another process for one that died, with the same job."""
         worker.process.join()
-        code = worker.process.exitcode
         worker.connection.close()
-        worker.process, worker.connection = self._process()
         worker.deaths += 1
-        if worker.deaths > RETRIES:
-            worker.job = None
-            listener.ended(job, Ending(error=f"its process died {worker.deaths} times, with code {code}"))
-        else:
+        if worker.deaths <= RETRIES:
+            worker.process, worker.connection = self._process()
             self._send(worker, job)
+            return
+        self._workers.remove(worker)
+        code = worker.process.exitcode
+        listener.ended(job, Ending(error=f"its process died {worker.deaths} times, with code {code}"))
 
 
 def _serve(connection: Connection, stop: Any) -> None:

@@ -8,6 +8,7 @@ goes on from its last checkpoint.
 from __future__ import annotations
 
 import os
+import pickle
 import shutil
 import sys
 import tempfile
@@ -15,12 +16,15 @@ import time
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ...envs.errors import ConfigurationError, DataError
 from ..interrupt import Interrupt
-from ..training import Status
+from .desk import Desk
 from .job import RETRIES, Ending, Job, Listener, Source, ending_of
+
+if TYPE_CHECKING:
+    from ..training import Status
 
 _PATIENCE: Final = 0.2
 """Time between looks at news and Ctrl-C, s."""
@@ -111,6 +115,8 @@ class RayEngine:
         """Run jobs until there are none; returns whether Ctrl-C stopped them."""
         interrupt = Interrupt()
         running: dict[Any, Job] = {}
+        # What was asked in an earlier run must not stop this one.
+        self._pass_on({}, listener, stop=False)
         with interrupt.caught():
             while True:
                 while not interrupt.asked and len(running) < self.slots and (job := source()) is not None:
@@ -135,9 +141,9 @@ class RayEngine:
         except self._ray.exceptions.RayActorError:
             # Its process died; Ray begins another.
             return
-        for name, status in news:
+        for name, packed in news:
             if name in jobs:
-                listener.told(jobs[name], status)
+                listener.told(jobs[name], pickle.loads(packed))
 
     def _ending(self, place: Any) -> Ending:
         try:
@@ -147,24 +153,6 @@ class RayEngine:
         except self._ray.exceptions.RayError as error:
             return Ending(error=" ".join(str(error).split()))
         return ending
-
-
-class Desk:
-    """Between workers and the process that began them: news one way, whether to stop the other."""
-
-    def __init__(self) -> None:
-        self._news: list[tuple[str, Status]] = []
-        self._stop = False
-
-    def tell(self, name: str, status: Status) -> bool:
-        """Leave news; returns whether to stop."""
-        self._news.append((name, status))
-        return self._stop
-
-    def hear(self, stop: bool) -> list[tuple[str, Status]]:
-        """Take the news."""
-        news, self._news, self._stop = self._news, [], stop
-        return news
 
 
 def _perform(job: Job, desk: Any, arguments: list[str], folder: str) -> Ending:
@@ -190,7 +178,7 @@ class _Report:
             return False
         self._last = now
         try:
-            return bool(ray.get(self._desk.tell.remote(self._name, status)))
+            return bool(ray.get(self._desk.tell.remote(self._name, pickle.dumps(status))))
         except ray.exceptions.RayActorError:
             # Nobody at the desk for a moment; the training goes on.
             return False
