@@ -113,16 +113,16 @@ def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
         versions=versions(),
         hardware=hardware("cpu"),
         duration=client.duration,
-        periods=client.sent,
+        periods=client.periods,
         overrun=client.pace.overrun,
         skipped=client.pace.skipped,
         packets={**client.counts, "unsent": endpoint.unsent},
-        steps={state.name.lower(): count for state, count in client.states.items()},
+        states={state.name.lower(): count for state, count in client.states.items()},
         timings={name: histogram.summary() for name, histogram in client.timings.items()},
         faults=tuple(client.faults),
     )
     console = table_console()
-    for line in lines_of(report):
+    for line in lines_of(report, "set-points"):
         console.print(line, highlight=False, markup=False)
     print_table(console, timing_table(report))
     if command.report is not None:

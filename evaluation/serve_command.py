@@ -154,7 +154,7 @@ def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: En
     """Write the log and the report, and say what happened."""
     report = _report(command, served.controller, server, endpoint)
     console = table_console()
-    for line in lines_of(report):
+    for line in lines_of(report, "steps of 10 ms"):
         console.print(line, highlight=False, markup=False)
     print_table(console, timing_table(report))
     if command.report is not None:
@@ -177,7 +177,7 @@ def _report(command: ServeCommand, controller: Controller, server: Server, endpo
         overrun=server.pace.overrun,
         skipped=server.pace.skipped,
         packets={**inbox.counts, "lost": inbox.lost, "unsent": endpoint.unsent},
-        steps={state.name.lower(): int((states == state).sum()) for state in State},
+        states={state.name.lower(): int((states == state).sum()) for state in State},
         timings={name: histogram.summary() for name, histogram in server.timings.items()},
         faults=tuple(controller.faults),
     )

@@ -42,6 +42,7 @@ class Client:
             "server" their time in the controller; "wake" how late a packet was sent.
         faults: The first of what was wrong with set-points.
         pace: Of the packets.
+        periods: In which packets were due.
         duration: Of the run, s.
     """
 
@@ -62,7 +63,7 @@ class Client:
         self.timings = {name: Histogram() for name in ("round_trip", "server", "wake")}
         self.faults: list[str] = []
         self.pace = Pace(rate)
-        self.sent = 0
+        self.periods = 0
         self.duration = 0.0
         self._last = -1
         self._echoed = -1
@@ -79,7 +80,7 @@ class Client:
             self.timings["wake"].add(now - pace.deadline)
             for packet in self._trouble.sent(item._replace(time=_NS * now), _NS * now):
                 self._endpoint.send(self._form.pack_cues(packet), self._to)
-                self.sent += 1
+            self.periods += 1
             pace.done()
         self.duration = _NS * (time.perf_counter_ns() - begin)
 

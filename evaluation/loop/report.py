@@ -28,7 +28,7 @@ class LoopReport:
         overrun: That were not over when the next should have begun.
         skipped: That were left out, as an earlier one took so long.
         packets: That came, by what became of them.
-        steps: Of 10 ms, by state of the controller.
+        states: By state of the controller: its steps of 10 ms; of a client, the set-points that came.
         timings: By name, see docs/loop.md.
         faults: What the policy raised; or what was wrong with the set-points.
     """
@@ -44,7 +44,7 @@ class LoopReport:
     skipped: int
     packets: dict[str, int]
     timings: dict[str, TimingSummary]
-    steps: dict[str, int] = field(default_factory=dict)
+    states: dict[str, int] = field(default_factory=dict)
     faults: tuple[str, ...] = ()
 
 
@@ -58,20 +58,25 @@ def timing_table(report: LoopReport) -> TextTable:
     return TextTable("Timings", header, tuple(rows))
 
 
-def lines_of(report: LoopReport) -> list[str]:
-    """What was counted, in words; what did not happen is left out."""
+def lines_of(report: LoopReport, counted_in: str) -> list[str]:
+    """What was counted, in words; what did not happen is left out.
+
+    Args:
+        report: The report.
+        counted_in: What its ``states`` count.
+    """
     missed = report.overrun + report.skipped
     share = missed / max(report.periods + report.skipped, 1)
     counted = ", ".join(
         f"{name.replace('_', ' ')} {count}" for name, count in report.packets.items() if count
     )
-    steps = ", ".join(f"{name} {count}" for name, count in report.steps.items() if count)
+    states = ", ".join(f"{name} {count}" for name, count in report.states.items() if count)
     lines = [
         f"{report.periods} periods in {report.duration:.1f} s; deadlines missed: {missed} "
         f"({100.0 * share:.4f} %), {report.overrun} late and {report.skipped} left out",
         f"packets: {counted or 'none'}",
     ]
-    return [*lines, *([f"steps of 10 ms: {steps}"] if steps else []), *report.faults]
+    return [*lines, *([f"{counted_in}: {states}"] if states else []), *report.faults]
 
 
 def _microseconds(seconds: float | None) -> str:

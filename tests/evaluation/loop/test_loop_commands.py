@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation import Trajectory
+from motion_cueing.evaluation import Trajectory, drive_command, serve_command
 from motion_cueing.evaluation.command_line import main
+from motion_cueing.evaluation.drive_command import DriveCommand
 from motion_cueing.evaluation.loop.client import Client, cues_at
 from motion_cueing.evaluation.loop.endpoint import Endpoint, address_of, is_loopback
 from motion_cueing.evaluation.loop.limit_check import LimitCheck
@@ -22,10 +24,11 @@ from motion_cueing.evaluation.loop.trouble import Trouble
 from motion_cueing.evaluation.loop.watchdog import State
 from motion_cueing.evaluation.results import Results
 from motion_cueing.evaluation.saved import load_json
+from motion_cueing.evaluation.serve_command import ServeCommand
 
 from .loops import FLOATS, PAPER, lane_change
 
-GENTLE = ["--overdue", "2", "--hold", "3", "--stale", "2", "--steady", "0", "--rate", "100"]
+GENTLE = {"rate": 100, "overdue": 20.0, "hold": 30.0, "stale": 20.0, "steady": 0.0}
 """So that a machine that is slow for a moment fails nothing."""
 
 
@@ -35,33 +38,46 @@ def free_port() -> int:
         return one.getsockname()[1]
 
 
+class Button:
+    """Ctrl-C, pressed by the test."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    @contextmanager
+    def caught(self):
+        yield
+
+
 @pytest.mark.parametrize("form", ["floats", "msgpack"])
-def test_a_drive_over_the_loopback_leaves_log_and_report(form, tmp_path, capsys):
-    cues, port = tmp_path / "lane.csv", str(free_port())
-    lane_change(1.0).to_csv(cues)
-    log, told = tmp_path / "log.npz", tmp_path / "told.json"
-    serve = ["serve", "--policy", "classical", "--port", port, "--format", form, "--duration", "2", *GENTLE]
-    server = threading.Thread(target=main, args=([*serve, "--log", str(log), "--report", str(told)],))
+def test_a_drive_over_the_loopback_leaves_log_and_report(form, tmp_path, capsys, monkeypatch):
+    log, told, driven = tmp_path / "log.npz", tmp_path / "told.json", tmp_path / "drive.json"
+    cues, port, button, listens = tmp_path / "lane.csv", free_port(), Button(), threading.Event()
+    lane_change(0.4).to_csv(cues)
+    announce = serve_command._announce
+    monkeypatch.setattr(serve_command, "Interrupt", lambda: button)
+    monkeypatch.setattr(serve_command, "_announce", lambda *given: (announce(*given), listens.set()))
+    command = ServeCommand("classical", port=port, format=form, log=log, report=told, **GENTLE)
+    server = threading.Thread(target=serve_command.run, args=(command,))
     server.start()
-    drive = ["drive", "--maneuver", str(cues), "--to", f"127.0.0.1:{port}", "--format", form, "--rate", "100"]
-    status, tries = 1, 0
-    # Until the controller listens, nothing comes back.
-    while status and tries < 20:
-        status = main([*drive, "--after", "0.1", "--report", str(tmp_path / "drive.json")])
-        tries += 1
+    assert listens.wait(60.0)
+    drive = DriveCommand(str(cues), f"127.0.0.1:{port}", 100, format=form, after=0.1, report=driven)
+    status = drive_command.run(drive)
+    button.asked = True
     server.join()
     assert status == 0
-    served = load_json(LoopReport, told, "a report", SCHEMA)
-    driven = load_json(LoopReport, tmp_path / "drive.json", "a report", SCHEMA)
-    assert served.packets["used"] >= 1
-    assert served.steps["running"] > 0
-    assert driven.packets["received"] > 0
-    assert driven.packets["malformed"] == driven.packets["outside_limits"] == 0
-    assert served.timings["period"].count == served.periods
+    found = load_json(LoopReport, told, "a report", SCHEMA)
+    assert found.packets["used"] > 0
+    assert found.states["running"] > 0
+    assert found.timings["period"].count == found.periods
+    assert found.command.startswith("motion-cueing serve --policy classical")
+    answers = load_json(LoopReport, driven, "a report", SCHEMA).packets
+    assert answers["received"] > 0
+    assert answers["malformed"] == answers["outside_limits"] == 0
     assert f"UDP 127.0.0.1:{port}" in capsys.readouterr().out
-    drive_again = Trajectory.load(log)
-    assert len(drive_again) == sum(served.steps.values())
-    assert np.abs(drive_again.f_wanted[:, 1]).max() > 0.1
+    logged = Trajectory.load(log)
+    assert len(logged) == sum(found.states.values())
+    assert np.abs(logged.f_wanted[:, 1]).max() > 0.0
     assert main(["evaluate", "--replay", str(log), "--out", str(tmp_path / "out")]) == 0
     results = Results.load_json(tmp_path / "out" / "results.json")
     assert list(results.maneuvers["log"]) == ["driven"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.envs.platform.kinematics import legs_of_pose
@@ -33,6 +33,7 @@ def test_constant_acceleration_is_met_exactly(position, rate, acceleration, peri
     np.testing.assert_array_equal(rows[-1, MOTION["position"]], end[0, :9])
 
 
+@settings(max_examples=25)
 @given(begin=VECTORS, end=VECTORS, rates=st.tuples(VECTORS, VECTORS))
 def test_position_is_the_cubic_with_the_right_ends_and_slopes(begin, end, rates):
     rows = Track(4, DT).between(np.array([begin, rates[0]]), np.array([end, rates[1]]))
