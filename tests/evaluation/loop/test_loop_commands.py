@@ -15,6 +15,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import Trajectory, drive_command, serve_command
 from motion_cueing.evaluation.command_line import main
 from motion_cueing.evaluation.drive_command import DriveCommand
+from motion_cueing.evaluation.evaluate_command import EvaluateCommand, make_plan
 from motion_cueing.evaluation.loop.client import Client, cues_at
 from motion_cueing.evaluation.loop.endpoint import Endpoint, address_of, is_loopback
 from motion_cueing.evaluation.loop.limit_check import LimitCheck
@@ -22,9 +23,9 @@ from motion_cueing.evaluation.loop.packets import Cues, SetPoint
 from motion_cueing.evaluation.loop.report import SCHEMA, LoopReport
 from motion_cueing.evaluation.loop.trouble import Trouble
 from motion_cueing.evaluation.loop.watchdog import State
-from motion_cueing.evaluation.results import Results
 from motion_cueing.evaluation.saved import load_json
 from motion_cueing.evaluation.serve_command import ServeCommand
+from motion_cueing.evaluation.suite import run_suite
 
 from .loops import FLOATS, PAPER, lane_change
 
@@ -49,15 +50,15 @@ class Button:
         yield
 
 
-@pytest.mark.parametrize("form", ["floats", "msgpack"])
-def test_a_drive_over_the_loopback_leaves_log_and_report(form, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize(("form", "policy"), [("floats", "classical"), ("msgpack", "no-motion")])
+def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, tmp_path, capsys, monkeypatch):
     log, told, driven = tmp_path / "log.npz", tmp_path / "told.json", tmp_path / "drive.json"
     cues, port, button, listens = tmp_path / "lane.csv", free_port(), Button(), threading.Event()
     lane_change(0.4).to_csv(cues)
     announce = serve_command._announce
     monkeypatch.setattr(serve_command, "Interrupt", lambda: button)
     monkeypatch.setattr(serve_command, "_announce", lambda *given: (announce(*given), listens.set()))
-    command = ServeCommand("classical", port=port, format=form, log=log, report=told, **GENTLE)
+    command = ServeCommand(policy, port=port, format=form, log=log, report=told, **GENTLE)
     server = threading.Thread(target=serve_command.run, args=(command,))
     server.start()
     assert listens.wait(60.0)
@@ -70,7 +71,7 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, tmp_path, capsys,
     assert found.packets["used"] > 0
     assert found.states["running"] > 0
     assert found.timings["period"].count == found.periods
-    assert found.command.startswith("motion-cueing serve --policy classical")
+    assert found.command.startswith("motion-cueing serve")
     answers = load_json(LoopReport, driven, "a report", SCHEMA).packets
     assert answers["received"] > 0
     assert answers["malformed"] == answers["outside_limits"] == 0
@@ -78,10 +79,10 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, tmp_path, capsys,
     logged = Trajectory.load(log)
     assert len(logged) == sum(found.states.values())
     assert np.abs(logged.f_wanted[:, 1]).max() > 0.0
-    assert main(["evaluate", "--replay", str(log), "--out", str(tmp_path / "out")]) == 0
-    results = Results.load_json(tmp_path / "out" / "results.json")
-    assert list(results.maneuvers["log"]) == ["driven"]
-    assert results.maneuvers["log"]["driven"].cue_error > 0.0
+    plan = make_plan(EvaluateCommand(replay=(log,), out=tmp_path / "out"))
+    outcome = run_suite(plan.maneuvers, plan.policies, lambda maneuver, drives: None)
+    assert list(outcome.maneuvers["log"]) == ["driven"]
+    assert outcome.maneuvers["log"]["driven"].cue_error > 0.0
 
 
 def test_a_replay_needs_its_own_machine_and_cues(tmp_path, capsys):
