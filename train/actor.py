@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Final
 
@@ -23,9 +24,6 @@ ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {
     "silu": nn.SiLU,
 }
 """Names of activations."""
-
-_QUIET: Final = 0.002
-"""Standard deviation of the last layer's weights on the hidden layer at the beginning."""
 
 _SPRINGS: Final = {"carriage": 0.3, "hexapod": 1.0}
 """Natural frequency of the spring and damper a training begins with, rad/s."""
@@ -60,7 +58,10 @@ class Latent(nn.Module):
 
 
 class Actor(nn.Module):
-    """Observation -> hidden layers -> [hidden, observation] -> linear -> tanh.
+    """Observation -> standardised -> hidden layers -> [hidden, standardised] -> linear -> reach -> tanh.
+
+    Mean and deviation of the observation and the reach of each action are no weights: they give the weights a
+    scale that a learning rate can be chosen for. Until :meth:`standardise` they change nothing.
 
     Args:
         size: Entries of an observation.
@@ -69,25 +70,65 @@ class Actor(nn.Module):
         activation: One of :data:`ACTIVATIONS`.
     """
 
+    mean: torch.Tensor
+    deviation: torch.Tensor
+    reach: torch.Tensor
+
     def __init__(self, size: int, action_size: int, hidden: Sequence[int], activation: str = "elu") -> None:
         super().__init__()
         self.latent = Latent(size, hidden, activation)
         self.head = nn.Linear(self.latent.size, action_size)
+        self.register_buffer("mean", torch.zeros(size))
+        self.register_buffer("deviation", torch.ones(size))
+        self.register_buffer("reach", torch.ones(action_size))
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """(n, action_size) in (-1, 1) for observations (n, size)."""
-        action: torch.Tensor = torch.tanh(self.head(self.latent(observation)))
+        standard = (observation - self.mean) / self.deviation
+        action: torch.Tensor = torch.tanh(self.reach * self.head(self.latent(standard)))
         return action
 
+    @torch.no_grad()
+    def standardise(self, mean: torch.Tensor, deviation: torch.Tensor, reach: torch.Tensor) -> None:
+        """Take a standard of observations (size,) and actions (action_size,); what is done stays the same.
+
+        Only hidden layers that the last one does not listen to keep their weights: theirs is a beginning.
+        """
+        first, size = self._linear[0], mean.numel()
+        if first is not self.head and self.head.weight[:, :-size].any():
+            _see_relative(first.weight, first.bias, mean, deviation)
+        _see_relative(self.head.weight[:, -size:], self.head.bias, mean, deviation)
+        self.head.weight.div_(reach[:, None])
+        self.head.bias.div_(reach)
+        self.mean.copy_(mean)
+        self.deviation.copy_(deviation)
+        self.reach.copy_(reach)
+
     def network(self) -> Network:
-        """The same in NumPy."""
+        """The same in NumPy, its standard within its weights."""
+        plain = copy.deepcopy(self)
+        plain._forget_standard()
         return Network(
-            weights=tuple(_numpy(layer.weight) for layer in self._linear),
-            biases=tuple(_numpy(layer.bias) for layer in self._linear),
+            weights=tuple(_numpy(layer.weight) for layer in plain._linear),
+            biases=tuple(_numpy(layer.bias) for layer in plain._linear),
             activation=self.latent.activation,  # type: ignore[arg-type]
             squash="tanh",
             skip=True,
         )
+
+    @torch.no_grad()
+    def _forget_standard(self) -> None:
+        """Make mean, deviation and reach part of the weights."""
+        first, size = self._linear[0], self.mean.numel()
+        back = -self.mean / self.deviation, 1.0 / self.deviation
+        if first is not self.head:
+            _see_relative(first.weight, first.bias, *back)
+        _see_relative(self.head.weight[:, -size:], self.head.bias, *back)
+        self.head.weight.mul_(self.reach[:, None])
+        self.head.bias.mul_(self.reach)
+        self.mean.zero_()
+        self.deviation.fill_(1.0)
+        self.reach.fill_(1.0)
 
     def load(self, network: Network) -> None:
         """Take over the weights of a network.
@@ -103,6 +144,7 @@ class Actor(nn.Module):
                 f"which are {[w.shape[0] for w in network.weights[:-1]]} and {network.activation}"
             )
         with torch.no_grad():
+            self._forget_standard()
             for layer, weight, bias in zip(self._linear, network.weights, network.biases, strict=True):
                 layer.weight.copy_(torch.from_numpy(weight.copy()))
                 layer.bias.copy_(torch.from_numpy(bias.copy()))
@@ -113,27 +155,23 @@ class Actor(nn.Module):
 
 
 def begin_at_rest(actor: Actor, batch: Batch) -> None:
-    """Make an actor a spring and damper to neutral, and next to nothing else.
+    """Make an actor a spring and damper to neutral, and nothing else.
 
     So a training begins with a machine that stays in its travel, and moves at all: every gradient is useful.
     """
-    begin_as(actor, _springs(batch.layout, batch.scale), _QUIET)
+    begin_as(actor, _springs(batch.layout, batch.scale))
 
 
-def begin_as(actor: Actor, gains: NDArray[np.float32], quiet: float) -> None:
-    """Make an actor linear in the observation.
+def begin_as(actor: Actor, gains: NDArray[np.float32]) -> None:
+    """Make an actor linear in the observation; its last layer does not listen to the hidden ones.
 
     Args:
         actor: The network.
         gains: (action_size, size) of its last layer on the observation.
-        quiet: Standard deviation of its weights on the hidden layer.
     """
-    hidden = actor.latent.size - gains.shape[1]
     with torch.no_grad():
-        weight = torch.zeros_like(actor.head.weight)
-        weight[:, :hidden] = quiet * torch.randn(weight.shape[0], hidden)
-        weight[:, hidden:] = torch.from_numpy(gains)
-        actor.head.weight.copy_(weight)
+        actor.head.weight.zero_()
+        actor.head.weight[:, -gains.shape[1] :] = torch.from_numpy(gains)
         actor.head.bias.zero_()
 
 
@@ -155,6 +193,14 @@ def _springs(layout: Layout, scale: NDArray[np.float64]) -> NDArray[np.float32]:
     gains[moving] /= scale[moving, None]
     gains[~moving] = 0.0
     return gains.astype(np.float32)
+
+
+def _see_relative(
+    weight: torch.Tensor, bias: torch.Tensor, mean: torch.Tensor, deviation: torch.Tensor
+) -> None:
+    """Make a layer on observations one on (observation - mean) / deviation, in place."""
+    bias += weight @ mean
+    weight *= deviation
 
 
 def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:

@@ -1,7 +1,9 @@
-"""Analytic policy gradient: the reward's own gradient, through policy and machine, over a whole episode.
+"""Analytic policy gradient: the reward's own gradient, through policy and machine.
 
-Every round draws an episode in each environment, drives it with the policy, leads the gradient of the cost
-back through every time step, and takes a step of Adam. There is no critic, and nothing is sampled.
+Every round drives a window in each environment with the policy, leads the gradient of the cost back through
+every time step, and takes a step of Adam. A window is a whole episode, or it is shorter and the next one goes
+on where it ended; then a learned value of its end can stand for what is still to come (the short-horizon
+actor-critic, SHAC, of Xu et al. 2022). No action is ever sampled.
 """
 
 from __future__ import annotations
@@ -22,12 +24,16 @@ from ..envs.task.reward_kernel import TERMS
 from ..envs.task.unroll import TaskUnroll
 from .actor import ACTIVATIONS, Actor
 from .agent import Network
+from .ahead import Ahead, ValueOptions
 from .config import TrainingConfig
 from .initial import begin
 from .learner import Boundary, State, restoring
 from .schedule import warm_cosine
+from .standard import standardise
+from .through_time import ThroughTime, tamed
 
-_TINY: Final = 1e-30
+_USUAL: Final = 0.1
+"""Weight of a new window in what a drive usually costs."""
 
 Floats = NDArray[np.float64]
 
@@ -41,9 +47,12 @@ class GradientHyperparameters:
         net_arch: Entries of each hidden layer.
         activation_fn: Of the hidden layers.
         max_grad_norm: Longer gradients are shortened to it.
-        outlier: An episode's own gradient is shortened to so many times the median episode's.
-        offset: The cost of an episode counts as log(offset + cost): every drive by its relative gain, a wild
-            one as much as a gentle one.
+        outlier: An environment's own gradient is shortened to so many times the median one's.
+        offset: The cost of a drive counts relative to this plus what the drive usually costs: every drive by
+            its relative gain, a wild one as much as a gentle one.
+        standardise: Whether the policy sees observations relative to mean and deviation under the first one.
+        window: How far gradients are led, s; None: to the end of the episode.
+        value: Of what comes after a window; None: nothing does.
     """
 
     learning_rate: Positive = 2e-3
@@ -52,6 +61,9 @@ class GradientHyperparameters:
     max_grad_norm: Positive = 1.0
     outlier: Positive = 2.0
     offset: Positive = 0.2
+    standardise: bool = True
+    window: Positive | None = None
+    value: ValueOptions | None = None
 
 
 def make_learner(config: TrainingConfig) -> GradientLearner:
@@ -63,7 +75,7 @@ class GradientLearner:
     """See :class:`~.learner.Learner`.
 
     Args:
-        config: The training; ``task.episode.duration`` is how far gradients are led.
+        config: The training.
 
     Raises:
         ConfigurationError: a hyperparameter is wrong, or the task has no gradients.
@@ -72,19 +84,27 @@ class GradientLearner:
     def __init__(self, config: TrainingConfig) -> None:
         where = "hyperparameters"
         self.given = from_dict(GradientHyperparameters, dict(config.hyperparameters), where)
-        _check(config)
+        _check(config, self.given.window)
         torch.set_num_threads(config.threads)
         torch.manual_seed(config.seed)
         self._total, n = config.steps, config.n_envs
         self.batch = Batch(n, config.task, device=config.device)
-        self._everywhere = np.ones(n, dtype=bool)
-        self.batch.seed(self._everywhere, [config.seed + i for i in range(n)])
-        self._length = round(float(config.task.episode.duration or 0.0) / self.batch.time_step)
+        everywhere, seeds = np.ones(n, dtype=bool), [config.seed + i for i in range(n)]
+        self.batch.seed(everywhere, seeds)
+        self._episode = round(float(config.task.episode.duration or 0.0) / self.batch.time_step)
+        window = self.given.window
+        self._length = self._episode if window is None else round(window / self.batch.time_step)
         self._unroll = TaskUnroll(self.batch, self._length)
         size, actions = self.batch.layout.size, self.batch.action_size
         self.actor = Actor(size, actions, self.given.net_arch, self.given.activation_fn)
         begin(self.actor, self.batch, config)
+        if self.given.standardise:
+            standardise(self.actor, self.batch, self._episode)
+            self.batch.seed(everywhere, seeds)
         self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
+        self._ahead = Ahead(self.given.value, self.actor, self._length, self.batch.time_step)
+        # Actions to the end of each episode, and what each drive usually costs.
+        self._left, self._usual = np.zeros(n, dtype=np.int64), np.full(len(self.batch.drives), math.nan)
         self._rounds, self._skipped, self._left_out = 0, 0, 0
         self._sums: dict[str, float] = {}
         self._logged = 0
@@ -101,66 +121,56 @@ class GradientLearner:
             self._round()
 
     def _round(self) -> None:
-        seen = self._drive()
+        self._go_on()
+        drive = ThroughTime(self._unroll, self.actor)
         costs = self._unroll.costs
-        weights = 1.0 / (self.given.offset + costs) / self.batch.n
+        norm = 0.0 if self._ahead.waits(self._rounds) else self._improve(drive, costs)
+        self._rounds += 1
+        self._note(costs, {"train/gradient_norm": norm, **self._ahead.learn(drive.seen, costs)})
+
+    def _improve(self, drive: ThroughTime, costs: Floats) -> float:
+        """Take a step of the policy; returns the length of the gradient, 0 for one that is not finite."""
+        seen, end = drive.seen[:-1], drive.seen[-1]
+        whole = self._ahead.whole(costs, end)
+        weights = np.where(np.isfinite(whole), self._weights(whole), 0.0) / self.batch.n
+        gradients = drive.lead_back(self._ahead.weights(weights), self._ahead.gradient(end, weights))
+        gradients, left_out = tamed(gradients, self.given.outlier)
+        self._left_out += left_out
         self._optimizer.zero_grad()
-        self._lead_back(seen, np.where(np.isfinite(costs), weights, 0.0))
+        torch.sum(self.actor(seen) * gradients).backward()  # type: ignore[no-untyped-call]
         norm = float(torch.nn.utils.clip_grad_norm_(self.actor.parameters(), self.given.max_grad_norm))
         for group in self._optimizer.param_groups:
             group["lr"] = self.given.learning_rate * warm_cosine(self.steps / self._total)
-        if math.isfinite(norm) and norm > 0.0:
-            self._optimizer.step()
-        else:
+        if not math.isfinite(norm) or norm == 0.0:
             self._skipped += 1
-        self._rounds += 1
-        self._note(costs, norm)
+            return 0.0
+        self._optimizer.step()
+        return norm
 
-    def _drive(self) -> list[torch.Tensor]:
-        """Play an episode everywhere; returns what was seen before each action."""
-        self.batch.begin(self._everywhere)
-        self._unroll.begin()
-        seen = []
-        with torch.no_grad():
-            for k in range(self._length):
-                observation = torch.from_numpy(self._unroll.observe(k))
-                seen.append(observation)
-                self._unroll.act(k, self.actor(observation).numpy())
-        return seen
+    def _go_on(self) -> None:
+        """To the next window, in the next episode where one is over."""
+        begins = self._left <= 0
+        if self._rounds == 0:
+            # The first episodes end at different times, so that later windows lie all over an episode.
+            windows = max(self._episode // self._length, 1)
+            self._left = self._length * (1 + np.arange(self.batch.n) % windows)
+        else:
+            self._left[begins] = self._episode
+        self._unroll.go_on(begins)
+        self._left -= self._length
 
-    def _lead_back(self, seen: list[torch.Tensor], weights: Floats) -> None:
-        """Gather the gradient of the weighted costs in the actor's parameters."""
-        self._unroll.weigh(weights)
-        gradients: list[torch.Tensor] = []
-        for k in reversed(range(self._length)):
-            gradients.append(torch.from_numpy(self._unroll.back_through_act(k).copy()))
-            observation = seen[k].detach().requires_grad_(True)
-            (back,) = torch.autograd.grad(self.actor(observation), observation, gradients[-1])
-            self._unroll.back_through_observe(k, back.numpy())
-        of_actions = self._tamed(torch.stack(gradients[::-1]))
-        torch.sum(self.actor(torch.stack(seen)) * of_actions).backward()  # type: ignore[no-untyped-call]
+    def _weights(self, costs: Floats) -> Floats:
+        """(n,) of the windows: less where a drive is wild."""
+        drives = self.batch.simulator.drive_of
+        known = np.where(np.isnan(self._usual[drives]), costs, self._usual[drives])
+        self._usual[drives] = (1.0 - _USUAL) * known + _USUAL * costs
+        return np.asarray(1.0 / (self.given.offset + np.maximum(known, costs)))
 
-    def _tamed(self, gradients: torch.Tensor) -> torch.Tensor:
-        """(actions, n, k) gradients, where no episode pulls much harder than the others.
-
-        An episode in which policy and limits chatter has a gradient that grows with every step back, and
-        would be all there is in the sum. One that is not finite is left out.
-        """
-        norms = gradients.flatten(2).pow(2).sum(dim=(0, 2)).sqrt()
-        sound = torch.isfinite(norms)
-        self._left_out += int((~sound).sum())
-        if not sound.any():
-            return torch.zeros_like(gradients)
-        largest = self.given.outlier * norms[sound].median()
-        factors = torch.where(sound, torch.clamp(largest / norms.clamp_min(_TINY), max=1.0), 0.0)
-        return torch.nan_to_num(gradients, 0.0, 0.0, 0.0) * factors[None, :, None]
-
-    def _note(self, costs: Floats, norm: float) -> None:
-        terms = self._unroll.terms
+    def _note(self, costs: Floats, told: dict[str, float]) -> None:
+        terms, means = self._unroll.terms, costs.mean(axis=0)
         row = {f"terms/{name}": float(value) for name, value in zip(TERMS, terms, strict=True)}
-        row |= {"rollout/reward": -float(costs.mean()), "rollout/median_cost": float(np.median(costs))}
-        row |= {"train/gradient_norm": norm if math.isfinite(norm) else 0.0}
-        for name, value in row.items():
+        row |= {"rollout/reward": -float(means.mean()), "rollout/median_cost": float(np.median(means))}
+        for name, value in (row | told).items():
             self._sums[name] = self._sums.get(name, 0.0) + value
         self._logged += 1
 
@@ -182,6 +192,8 @@ class GradientLearner:
             "actor": self.actor.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "batch": self.batch.snapshot(),
+            "window": {"left": self._left.copy(), "usual": self._usual.copy(), **self._unroll.snapshot()},
+            "ahead": self._ahead.state(),
             "counts": [self._rounds, self._skipped, self._left_out, self._logged],
             "sums": dict(self._sums),
         }
@@ -192,15 +204,23 @@ class GradientLearner:
             self.actor.load_state_dict(state["actor"])
             self._optimizer.load_state_dict(state["optimizer"])
             self.batch.restore(state["batch"])
+            self._unroll.restore(state["window"])
+            self._left, self._usual = state["window"]["left"].copy(), state["window"]["usual"].copy()
+            self._ahead.restore(state["ahead"])
             counts = (int(count) for count in state["counts"])
             self._rounds, self._skipped, self._left_out, self._logged = counts
             self._sums = dict(state["sums"])
 
 
-def _check(config: TrainingConfig) -> None:
-    if config.task.episode.duration is None:
+def _check(config: TrainingConfig, window: float | None) -> None:
+    duration = config.task.episode.duration
+    if duration is None:
         raise ConfigurationError(
-            "task.episode.duration must say how far gradients are led, s; 20 is a good start"
+            "task.episode.duration must say how long an episode is, s; 20 is a good start"
+        )
+    if window is not None and not math.isclose(duration / window, max(round(duration / window), 1)):
+        raise ConfigurationError(
+            f"hyperparameters.window {window:g} must be a whole part of task.episode.duration {duration:g}"
         )
     if config.task.episode.terminate_on_failure:
         raise ConfigurationError("task.episode.terminate_on_failure has no gradient; leave it off for apg")

@@ -24,6 +24,7 @@ from .config import TrainingConfig
 from .initial import begin
 from .learner import Boundary, State, restoring
 from .schedule import warm_cosine
+from .standard import take_standard
 from .teacher import Teacher
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -113,6 +114,8 @@ class ImitationLearner:
         while self.steps < self._total:
             boundary()
             self._drive()
+            if self._rounds == 0:
+                take_standard(self.actor, self._seen[0].numpy(), self._told[0].numpy())
             self._fit()
             self._rounds += 1
 
@@ -156,9 +159,11 @@ class ImitationLearner:
         total = 0.0
         for _ in range(given.updates):
             chosen = torch.randint(len(seen), (given.batch_size,), generator=self._order)
-            loss = (self.actor(seen[chosen]) - told[chosen]).pow(2).mean()
+            # Every axis by the reach of its own actions; far from the teacher's way answers are wild.
+            reach = self.actor.reach
+            loss = torch.nn.functional.smooth_l1_loss(self.actor(seen[chosen]) / reach, told[chosen] / reach)
             self._optimizer.zero_grad()
-            loss.backward()
+            loss.backward()  # type: ignore[no-untyped-call]
             torch.nn.utils.clip_grad_norm_(self.actor.parameters(), given.max_grad_norm)
             self._optimizer.step()
             total += float(loss.detach())

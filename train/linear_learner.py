@@ -138,7 +138,7 @@ class LinearLearner:
 
     def network(self) -> Network:
         """The best gains so far as a network."""
-        begin_as(self.actor, self._gains(self._best), quiet=0.0)
+        begin_as(self.actor, self._gains(self._best))
         return self.actor.network()
 
     def state(self) -> dict[str, Any]:

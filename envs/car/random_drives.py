@@ -41,6 +41,7 @@ class RandomDrives:
         track: Of fierce drives on a handling track.
         hilly: Of drives over steep hills and crests.
         strip: Of drives with standing starts and full braking, far along a straight.
+        cones: Of weaves, sudden bends and lane changes close to what tires hold.
         cars: Cars to draw from, by name.
     """
 
@@ -50,6 +51,7 @@ class RandomDrives:
     track: NonNegative = 0.0
     hilly: NonNegative = 0.0
     strip: NonNegative = 0.0
+    cones: NonNegative = 0.0
     cars: Annotated[tuple[str, ...], Field(min_length=1)] = ("sedan",)
 
     def __post_init__(self) -> None:
@@ -95,7 +97,7 @@ def random_drive(
     Args:
         seed: The same seed gives the same drive.
         duration: 0.1 s to a day, s.
-        kind: "urban", "rural", "highway", "track", "hilly" or "strip"; drawn if None.
+        kind: "urban", "rural", "highway", "track", "hilly", "strip" or "cones"; drawn if None.
         car: Drawn from ``drives.cars`` if None.
         drives: What to draw from.
 

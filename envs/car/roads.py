@@ -32,6 +32,8 @@ class RoadKind:
         grade: Amplitude of the slope, rad.
         waves: Lengths of the two waves of the slope, m.
         events: Relative frequency of each event.
+        weave_period: Of a weave at the limit, s.
+        weave_width: Amplitude of a weave, m.
     """
 
     speed: Range
@@ -46,6 +48,8 @@ class RoadKind:
     grade: Range
     waves: tuple[Range, Range]
     events: dict[str, float]
+    weave_period: Range = (2.6, 4.5)
+    weave_width: Range = (0.4, 1.2)
 
 
 KMH: Final = 1.0 / 3.6
@@ -138,10 +142,26 @@ KINDS: Final = {
         waves=ROLLING,
         events={"stop": 4, "slow": 3, "bend": 1},
     ),
+    "cones": RoadKind(
+        speed=(40 * KMH, 90 * KMH),
+        accelerate=(1.0, 3.0),
+        brake=(2.0, 5.0),
+        lateral=(3.5, 6.0),
+        straight=(10.0, 80.0),
+        radius=(40.0, 250.0),
+        angle=(0.2, 1.2),
+        transition=(5.0, 15.0),
+        lane_change=(2.2, 3.5),
+        grade=(0.0, 0.01),
+        waves=ROLLING,
+        events={"weave": 4, "lane_change": 3, "bend": 3, "slow": 1},
+        weave_period=(2.3, 4.5),
+        weave_width=(0.4, 1.4),
+    ),
 }
 """Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers; on the
 handling track those of a test driver, in the hills slopes and crests of mountain roads, on the strip standing
-starts and full braking."""
+starts and full braking, among cones weaves, sudden bends and lane changes close to what tires hold."""
 
 CORNER_RADIUS: Final[Range] = (9.0, 18.0)
 """Of a right-angled turn at a crossing, m."""
@@ -152,13 +172,8 @@ ROUNDABOUT_RADIUS: Final[Range] = (14.0, 25.0)
 LANE_WIDTH: Final[Range] = (2.8, 3.75)
 """m."""
 
-WEAVE_PERIOD: Final[Range] = (2.6, 4.5)
-"""Of a weave at the limit, s."""
-
 WEAVE_PERIODS: Final[Range] = (2.0, 5.0)
-
-WEAVE_WIDTH: Final[Range] = (0.4, 1.2)
-"""Amplitude of a weave, m."""
+"""Of a weave."""
 
 
 @dataclass
@@ -243,10 +258,10 @@ def add_lane_change(road: Road) -> None:
 
 def add_weave(road: Road) -> None:
     """To and fro within the road, some periods of a sine of curvature."""
-    length = road.draw(WEAVE_PERIOD) * road.limit
+    length = road.draw(road.kind.weave_period) * road.limit
     stations = np.arange(0.0, length * round(road.draw(WEAVE_PERIODS)), STEP)
     # The car sways by peak (length / 2 pi)^2 to either side.
-    peak = road.draw(WEAVE_WIDTH) * (2.0 * np.pi / length) ** 2
+    peak = road.draw(road.kind.weave_width) * (2.0 * np.pi / length) ** 2
     road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length))
 
 

@@ -124,6 +124,8 @@ class RewardOptions:
         rate_threshold: Perception of angular velocity x, y, z, rad/s (Zacharias; 3.0, 3.6, 2.6 deg/s).
         tilt_rate: Tilt rate that goes unnoticed, rad/s (3 deg/s, SIMONA).
         stroke_margin: Share of the travel that costs nothing.
+        stroke_braking: Travel counts where an actuator would come to a stop with this share of its
+            acceleration, so that what lies beyond a short horizon costs now; None: where it is.
     """
 
     weights: RewardWeights = RewardWeights()
@@ -132,6 +134,7 @@ class RewardOptions:
     rate_threshold: Vector3 = (math.radians(3.0), math.radians(3.6), math.radians(2.6))
     tilt_rate: Positive = math.radians(3.0)
     stroke_margin: Share = 0.8
+    stroke_braking: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
 
 
 @configuration

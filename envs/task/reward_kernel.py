@@ -40,6 +40,7 @@ class RewardScale:
     rate_threshold: vec3
     tilt_rate: real
     stroke_margin: real
+    stopping: real  # travel to a stop, times acceleration over rate squared
     terminate: int  # whether failure ends an episode
 
 
@@ -51,6 +52,8 @@ def reward_scale(options: RewardOptions, terminate: bool) -> Any:
     scale.force_threshold = vec3(*options.force_threshold)
     scale.rate_threshold = vec3(*options.rate_threshold)
     scale.tilt_rate, scale.stroke_margin = options.tilt_rate, options.stroke_margin
+    braking = options.stroke_braking
+    scale.stopping = 0.0 if braking is None else 1.0 / (2.0 * braking)
     scale.terminate = int(terminate)
     return scale
 
@@ -100,10 +103,14 @@ def tilt_excess(r: RewardScale, s: State) -> real:
 
 @wp.func
 def stroke_excess(r: RewardScale, m: Machine, s: State) -> real:
-    """Square of the travel used beyond the margin, over the way from there to the end, all actuators."""
+    """Square of the travel used beyond the margin, over the way from there to the end, all actuators.
+
+    Used is the place where an actuator comes to a stop.
+    """
     total = real(0.0)
     for k in range(9):
-        q = s.motion.position[k]
+        rate = s.motion.rate[k]
+        q = s.motion.position[k] + r.stopping * rate * wp.abs(rate) / m.acceleration[k]
         end = wp.where(q >= real(0.0), m.position_max[k], -m.position_min[k])
         # A missing subsystem has no travel, and an unlimited one no end.
         if end > real(0.0) and end < real(wp.static(UNLIMITED)):

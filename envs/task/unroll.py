@@ -1,7 +1,8 @@
-"""A batch of episodes over many actions, differentiable: for training by the machine's own gradients."""
+"""A batch of drives over many actions, differentiable: for training by the machine's own gradients."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..errors import ConfigurationError
 from ..observation import OBSERVATION_SIZE
 from ..platform.state import SetPoint
 from ..precision import real, vec9
+from ..snapshot import Snapshot, bytes_of, put_bytes
 from ..state import State
 from .batch import Batch
 from .reward_kernel import vec_terms
@@ -23,9 +25,10 @@ _MODES: Final = ("acceleration", "jerk", "velocity")
 class TaskUnroll:
     """What a batch would do over a number of actions, kept so that gradients can be led back through it.
 
-    Forward: :meth:`begin`, then for each action k = 0, 1, ...: :meth:`observe`, :meth:`act`. Backward, after
-    :meth:`weigh`, for k from the last to the first: :meth:`back_through_act`, which tells the gradient with
-    respect to action k, and :meth:`back_through_observe` with that of what was seen.
+    Forward: :meth:`begin` or :meth:`go_on`, then for each action k = 0, 1, ...: :meth:`observe`,
+    :meth:`act`; and once more :meth:`observe` where the end counts. Backward, after :meth:`weigh`, from the
+    last to the first: :meth:`back_through_observe` with the gradient of what was seen, and
+    :meth:`back_through_act`, which tells that with respect to the action.
 
     Args:
         batch: Where episodes are drawn; its own state stays where it is.
@@ -48,8 +51,8 @@ class TaskUnroll:
         self.batch, self.actions = batch, actions
         self.repeat = options.action.repeat
         self._allocate()
-        self._forward = [self._record(k, adjoint=False) for k in range(actions)]
-        self._backward = [self._record(k, adjoint=True) for k in range(actions)]
+        self._looks, self._plays = self._record(adjoint=False)
+        self._looks_back, self._plays_back = self._record(adjoint=True)
 
     def _allocate(self) -> None:
         batch, n = self.batch, self.batch.n
@@ -65,20 +68,26 @@ class TaskUnroll:
         self._taken = [
             wp.zeros((n, batch.action_size), dtype=wp.float32, **keep) for _ in range(self.actions + 1)
         ]
-        self._fixed = [wp.zeros((n, OBSERVATION_SIZE), dtype=real, **keep) for _ in range(self.actions)]
-        self._seen = [wp.zeros((n, batch.layout.size), dtype=wp.float32, **keep) for _ in range(self.actions)]
-        self._costs = wp.zeros(n, dtype=real, **keep)
+        looks = range(self.actions + 1)
+        self._fixed = [wp.zeros((n, OBSERVATION_SIZE), dtype=real, **keep) for _ in looks]
+        self._seen = [wp.zeros((n, batch.layout.size), dtype=wp.float32, **keep) for _ in looks]
+        self._costs = wp.zeros((self.actions, n), dtype=real, **keep)
         self._terms = wp.zeros(n, dtype=vec_terms, device=device)
         self._all = [*self._states, *self._delays, *self._own, *self._taken, *self._fixed, *self._seen]
 
-    def _record(self, k: int, adjoint: bool) -> tuple[Any, list[Any]]:
-        """The launches around action k: of the observation, and of its time steps."""
-        look = self._launch(look_with_adjoint, self._look_arguments(k), adjoint)
-        plays = [
-            self._launch(play_with_adjoint, self._play_arguments(k, step), adjoint)
-            for step in range(self.repeat)
+    def _record(self, adjoint: bool) -> tuple[list[Any], list[list[Any]]]:
+        """The launches of all observations, and of the time steps of all actions."""
+        looks = [
+            self._launch(look_with_adjoint, self._look_arguments(k), adjoint) for k in range(self.actions + 1)
         ]
-        return look, plays
+        plays = [
+            [
+                self._launch(play_with_adjoint, self._play_arguments(k, step), adjoint)
+                for step in range(self.repeat)
+            ]
+            for k in range(self.actions)
+        ]
+        return looks, plays
 
     def _launch(self, kernel: Any, arguments: list[Any], adjoint: bool) -> Any:
         adjoints = {"adj_inputs": [_adjoint(a) for a in arguments], "adj_outputs": []} if adjoint else {}
@@ -110,32 +119,69 @@ class TaskUnroll:
             batch.rules, batch.arrays.episode.array, *constants, int(step == 0),
             self._taken[k + 1], self._taken[k], self._own[i], self._states[i], self._delays[i],
             self._own[i + 1], self._states[i + 1], self._delays[i + 1],
-            self._terms, self._costs,
+            self._terms, self._costs[k],
         ]  # fmt: skip
 
     def begin(self) -> None:
         """Take the batch's episodes as they are now, at their beginning."""
+        self._take_over(np.ones(self.batch.n, dtype=bool))
+
+    def go_on(self, begins: NDArray[np.bool_]) -> None:
+        """Go on from the end of the last unroll; where ``begins`` (n,) with the batch's next episode."""
+        wp.copy(self.batch.simulator.state_array, self._states[-1])
+        wp.copy(self.batch.simulator.delay_array, self._delays[-1])
+        if begins.any():
+            self.batch.begin(begins)
+        self._take_over(begins)
+
+    def _take_over(self, begins: NDArray[np.bool_]) -> None:
+        """Begin with the batch's state, and with the last actions but where an episode begins."""
         simulator = self.batch.simulator
         wp.copy(self._states[0], simulator.state_array)
         wp.copy(self._delays[0], simulator.delay_array)
+        for kept in (self._own, self._taken):
+            last = kept[-1].numpy()
+            kept[0].assign(np.where(begins[:, None], np.zeros_like(last), last))
         self._costs.zero_()
         self._terms.zero_()
 
+    def snapshot(self) -> Snapshot:
+        """What :meth:`go_on` needs, for :meth:`restore` of an unroll made alike."""
+        return {name: bytes_of(array) for name, array in self._carried()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Let :meth:`go_on` go on from a snapshot.
+
+        Raises:
+            DataError: it is of another unroll or version.
+        """
+        for name, array in self._carried():
+            put_bytes(array, name, snapshot)
+
+    def _carried(self) -> list[tuple[str, Any]]:
+        """The last of what changes, by name."""
+        return [
+            ("state", self._states[-1]),
+            ("delay", self._delays[-1]),
+            ("own", self._own[-1]),
+            ("taken", self._taken[-1]),
+        ]
+
     def observe(self, k: int) -> NDArray[np.float32]:
-        """(n, size) what is seen before action k; the array is the unroll's own."""
-        self._forward[k][0].launch()
+        """(n, size) what is seen before action k, or after the last; the array is the unroll's own."""
+        self._looks[k].launch()
         return np.asarray(self._seen[k].numpy())
 
     def act(self, k: int, action: NDArray[np.float32]) -> None:
         """Take action k, (n, action_size) within [-1, 1]."""
         self._taken[k + 1].assign(action)
-        for play in self._forward[k][1]:
+        for play in self._plays[k]:
             play.launch()
 
     @property
     def costs(self) -> NDArray[np.float64]:
-        """(n,) minus the mean reward an action."""
-        return np.asarray(self._costs.numpy()) / self.actions
+        """(actions, n) minus the reward of each action."""
+        return np.array(self._costs.numpy(), dtype=np.float64)
 
     @property
     def terms(self) -> NDArray[np.float64]:
@@ -144,21 +190,21 @@ class TaskUnroll:
         return means
 
     def weigh(self, weights: NDArray[np.float64]) -> None:
-        """Begin the way back: the gradients will be those of the sum of ``weights`` (n,) times the costs."""
+        """Begin the way back: gradients will be those of the sum of ``weights`` (actions, n) times costs."""
         for array in self._all:
             array.grad.zero_()
-        self._costs.grad.assign(weights / self.actions)
+        self._costs.grad.assign(weights)
 
     def back_through_act(self, k: int) -> NDArray[np.float32]:
-        """(n, action_size) gradient with respect to action k."""
-        for play in reversed(self._backward[k][1]):
+        """(n, action_size) gradient with respect to action k; the array is the unroll's own."""
+        for play in reversed(self._plays_back[k]):
             play.launch()
         return np.asarray(self._taken[k + 1].grad.numpy())
 
     def back_through_observe(self, k: int, gradient: NDArray[np.float32]) -> None:
-        """Lead the gradient (n, size) with respect to what was seen before action k back to the machine."""
+        """Lead the gradient (n, size) with respect to what :meth:`observe` told at k back to the machine."""
         self._seen[k].grad.assign(gradient)
-        self._backward[k][0].launch()
+        self._looks_back[k].launch()
 
 
 def _adjoint(argument: Any) -> Any:

@@ -10,7 +10,7 @@ from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 
 ROADS = ("urban", "rural", "highway")
-KINDS = (*ROADS, "track", "hilly", "strip")
+KINDS = (*ROADS, "track", "hilly", "strip", "cones")
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +53,7 @@ def test_each_begins_calm_and_lasts_as_long_as_asked(batches, kind):
         ("track", 7.5, 7.0),
         ("hilly", 3.2, 4.0),
         ("strip", 4.5, 8.0),
+        ("cones", 9.0, 6.0),
     ],
 )
 def test_accelerations_are_those_of_drivers(batches, kind, side, along):

@@ -54,7 +54,7 @@ def play(unroll: TaskUnroll, policy: LinearPolicy) -> np.ndarray:
     unroll.begin()
     for k in range(unroll.actions):
         unroll.act(k, policy(unroll.observe(k)).astype(np.float32))
-    return unroll.costs.copy()
+    return unroll.costs.mean(axis=0)
 
 
 def gradient(unroll: TaskUnroll, policy: LinearPolicy, weights: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def gradient(unroll: TaskUnroll, policy: LinearPolicy, weights: np.ndarray) -> n
     for k in range(unroll.actions):
         seen[k] = unroll.observe(k).copy()
         unroll.act(k, policy(seen[k]).astype(np.float32))
-    unroll.weigh(weights)
+    unroll.weigh(np.tile(weights / unroll.actions, (unroll.actions, 1)))
     total = np.zeros_like(policy.weights)
     for k in reversed(range(unroll.actions)):
         of_weights, of_observation = policy.back(seen[k], unroll.back_through_act(k).astype(np.float64))
@@ -118,7 +118,7 @@ def test_gradients_at_rest_are_finite():
     for k in range(4):
         unroll.observe(k)
         unroll.act(k, np.zeros((1, 9), dtype=np.float32))
-    unroll.weigh(np.ones(1))
+    unroll.weigh(np.full((4, 1), 0.25))
     for k in reversed(range(4)):
         found = unroll.back_through_act(k)
         assert np.isfinite(found).all()

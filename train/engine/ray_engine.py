@@ -64,33 +64,41 @@ class RayEngine:
         """Start Ray, or join the cluster.
 
         Raises:
-            DataError: there is no cluster at the address.
+            DataError: Ray does not start, or there is no cluster at the address.
         """
         os.environ.update(_ENVIRONMENT if self._address else {**_ENVIRONMENT, **_LOOPBACK})
         import ray
 
-        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
-        if self._address:
-            try:
-                ray.init(address=self._address, **quiet)
-            except (ConnectionError, ValueError, RuntimeError) as error:
-                reason = " ".join(str(error).split())
-                raise DataError(f"--address {self._address}: no Ray cluster answers ({reason})") from None
-        else:
-            # Sockets lie in it, whose paths must be short; session logs, too, which nobody reads afterwards.
-            self._folder = tempfile.mkdtemp(prefix="ray-")
-            ray.init(
-                num_cpus=self._jobs,
-                include_dashboard=False,
-                object_store_memory=_STORE,
-                _temp_dir=self._folder,
-                **quiet,
+        self._ray = ray
+        try:
+            ray.init(log_to_driver=False, logging_level="CRITICAL", **self._place())
+            self._begin()
+        except Exception as error:
+            self.__exit__(type(error), error, error.__traceback__)
+            where = (
+                f"--address {self._address}: no Ray cluster answers"
+                if self._address
+                else "Ray does not start"
             )
-        self._begin(ray)
+            raise DataError(f"{where} ({' '.join(str(error).split())})") from None
         return self
 
-    def _begin(self, ray: Any) -> None:
-        self._ray, here = ray, ray.get_runtime_context().get_node_id()
+    def _place(self) -> dict[str, Any]:
+        """Arguments of ``ray.init`` that say where."""
+        if self._address:
+            return {"address": self._address}
+        # Sockets lie in it, whose paths must be short; session logs, too, which nobody reads afterwards.
+        self._folder = tempfile.mkdtemp(prefix="ray-")
+        return {
+            "num_cpus": self._jobs,
+            "include_dashboard": False,
+            "object_store_memory": _STORE,
+            "_temp_dir": self._folder,
+        }
+
+    def _begin(self) -> None:
+        ray = self._ray
+        here = ray.get_runtime_context().get_node_id()
         nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
         self._largest = max(float(node.get("CPU", 0.0)) for node in nodes)
         near = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(here, soft=False)
