@@ -1,0 +1,105 @@
+"""What structure and horizon are worth to the gradient through the machine: short trainings, some seeds each.
+
+Run it with `python -m benchmarks.structure --out runs/structure`; a training of it that was stopped goes on.
+docs/training.md has what it found.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from motion_cueing.evaluation.text_table import TextTable, number, print_table, table_console
+from motion_cueing.train.config import load_config, merge
+from motion_cueing.train.run import RunFolder
+from motion_cueing.train.training import Training
+
+STEPS = 1_200_000
+EVERY = 120_000
+
+BASE: dict[str, Any] = {
+    "n_envs": 24,
+    "steps": STEPS,
+    "log_every": EVERY,
+    "task": {
+        "observation": {"memory": [0.1, 0.5, 2.0, 8.0], "frame": "cab"},
+        "action": {"frame": "cab", "authority": 1.0, "repeat": 2},
+        "reward": {
+            "weights": {"stroke": 10.0, "tilt_rate": 0.05},
+            "stroke_margin": 0.75,
+            "stroke_braking": 0.3,
+        },
+        "episode": {
+            "random": {"urban": 0.2, "rural": 0.1, "track": 0.3, "hilly": 0.1, "strip": 0.15, "cones": 0.15},
+            "library": 128,
+            "duration": 20.0,
+            "platform_offset": 0.2,
+            "random_start": True,
+        },
+    },
+    "hyperparameters": {"learning_rate": 6.0e-4, "window": 10.0, "outlier": 3.0, "offset": 1.0},
+    "validation": {"every": EVERY, "drives": 24},
+    "checkpoints": {"every": STEPS // 2},
+}
+"""The variant `base`: from springs, in the cab's frame, with memory."""
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "base": {},
+    "machine-frame": {"task": {"observation": {"frame": "machine"}, "action": {"frame": "machine"}}},
+    "no-memory": {"task": {"observation": {"memory": []}}},
+    "unscaled": {"hyperparameters": {"standardise": False}},
+    "preview": {"task": {"observation": {"preview": 10}}},
+    "from-washout": {},
+    "whole-episode": {"hyperparameters": {"window": None}},
+    "window-2s": {"hyperparameters": {"window": 2.0}},
+    "window-2s-value": {"hyperparameters": {"window": 2.0, "value": {}}},
+}
+"""What each changes."""
+
+WASHOUT: dict[str, Any] = merge(
+    {key: BASE[key] for key in ("n_envs", "task")},
+    {"steps": 10_800_000, "hyperparameters": {"population": 15}, "task": {"episode": {"duration": 30.0}}},
+)
+"""The linear washout that `from-washout` begins with."""
+
+
+def trained(folder: Path, algo: str, fields: dict[str, Any]) -> Training:
+    """A training that is over."""
+    training = Training(RunFolder.take_up(folder, load_config(algo, None, **fields)))
+    training.train()
+    return training
+
+
+def fields_of(variant: str, seed: int, out: Path) -> dict[str, Any]:
+    """The configuration of a variant's seed; a washout it begins with is trained first."""
+    fields = merge(merge(BASE, VARIANTS[variant]), {"seed": seed})
+    if variant == "from-washout":
+        washout = trained(out / f"washout-{seed}", "linear", {**WASHOUT, "seed": seed})
+        fields["initial"] = str(washout.run.best_agent)
+    return fields
+
+
+def main() -> None:
+    """Train, and print the lowest validation J of each."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=list(VARIANTS))
+    given = parser.parse_args()
+    rows = []
+    for variant in given.variants:
+        last = []
+        for seed in range(given.seeds):
+            fields = fields_of(variant, seed, given.out)
+            training = trained(given.out / f"{variant}-{seed}", "apg", fields)
+            last.append(float(training.status.best or 0.0))
+            print(f"{variant}, seed {seed}: {last[-1]:.3g}", flush=True)
+        spread = f"{number(min(last))} to {number(max(last))}"
+        rows.append((variant, number(sum(last) / len(last)), spread))
+    header = ("variant", "mean", "lowest to highest")
+    print_table(table_console(), TextTable("Best validation J", header, tuple(rows)))
+
+
+if __name__ == "__main__":
+    main()
