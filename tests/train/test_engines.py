@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -163,6 +165,24 @@ def test_what_is_missing_is_told(monkeypatch):
     monkeypatch.setattr(ray_engine, "find_spec", lambda name: None)
     with pytest.raises(ConfigurationError, match=r"needs ray: pip install 'motion-cueing-gym\[ray\]'"):
         make_engine("ray")
+
+
+def test_a_ray_that_does_not_start_is_told_and_leaves_nothing(monkeypatch):
+    made, given = [], {}
+
+    def init(**arguments):
+        given.update(arguments)
+        made.append(Path(arguments.get("_temp_dir", "none")).is_dir())
+        raise RuntimeError("too\nbusy")
+
+    library = SimpleNamespace(init=init, shutdown=lambda: None, __spec__="any")
+    monkeypatch.setitem(sys.modules, "ray", library)
+    for address, message in ((None, "Ray does not start"), ("a:1", "--address a:1: no Ray cluster answers")):
+        with pytest.raises(DataError, match=rf"{message} \(too busy\)"), RayEngine(3, address):
+            pass
+    assert made == [True, False]
+    assert not Path(given["_temp_dir"]).exists()
+    assert (given["num_cpus"], given["include_dashboard"], given["address"]) == (3, False, "a:1")
 
 
 def test_an_unexpected_error_leaves_its_trace(config, tmp_path, monkeypatch):
