@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -98,9 +102,8 @@ def run(command: ServeCommand) -> int:
     served = _made(command)
     endpoint = Endpoint(address_of(command.host, command.port))
     try:
-        _announce(command, endpoint)
         server = Server(served.controller, endpoint, make_format(command.format), command.rate, command.lead)
-        _run(command, server)
+        _run(command, server, endpoint)
     finally:
         endpoint.close()
     _finish(command, served, server, endpoint)
@@ -141,9 +144,24 @@ def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
     sys.stdout.flush()
 
 
-def _run(command: ServeCommand, server: Server) -> None:
+@contextmanager
+def _terminated_gently() -> Iterator[None]:
+    """Take SIGTERM for Ctrl-C within the block; only the main thread can."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    earlier = signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)
+
+
+def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
     interrupt, limit = Interrupt(), command.duration
-    with interrupt.caught(), undisturbed(command.cpu, command.priority):
+    with interrupt.caught(), _terminated_gently(), undisturbed(command.cpu, command.priority):
+        # Whoever reads it may stop the controller at once.
+        _announce(command, endpoint)
         try:
             server.run(lambda seconds: interrupt.asked or (limit is not None and seconds >= limit))
         except KeyboardInterrupt:

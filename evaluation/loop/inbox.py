@@ -49,7 +49,7 @@ class Inbox:
         self._since = math.inf
         self._lost = 0
         self._window = SequenceWindow(_LARGEST_LEAP)
-        self._offset = math.inf
+        self._offset, self._looked = math.inf, math.inf
         self._bound: Address | None = None
 
     def renew(self) -> None:
@@ -99,9 +99,9 @@ class Inbox:
         if place is not Place.NEW:
             return str(place.value)
         offset = now - cues.time
-        least = min(offset, self._offset + _DRIFT * max(now - self.arrival, 0.0))
-        self._offset = least
-        if offset - least > self._stale:
+        self._offset = min(offset, self._offset + _DRIFT * max(now - self._looked, 0.0))
+        self._looked = now
+        if offset - self._offset > self._stale:
             return "stale"
         if not now - self.arrival <= self._gap:
             self._since = now

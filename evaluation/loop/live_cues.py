@@ -49,7 +49,10 @@ class LiveCues:
         drives = simulator.constants[2]
         self._simulator = simulator
         self._rows = [drives.force.numpy(), drives.rate.numpy(), drives.rate_derivative.numpy()]
-        self._memory = None if memory is None else memory.view
+        # Views that are made once: each step of a millisecond counts.
+        self._moves = [(rows[:-1], rows[1:], rows[-1]) for rows in self._rows]
+        self._samples = [states.numpy()["sample"] for states, _ in simulator.copies]
+        self._memory = memory.view if memory is not None and time_constants else None
         self._poles = np.exp(-TIME_STEP / np.array(time_constants, dtype=np.float64))[:, None]
         self._past: Floats = np.tile(self._scaled(), (len(time_constants), 1))
 
@@ -60,12 +63,12 @@ class LiveCues:
 
     def put(self, cues: Floats) -> None:
         """Move on by a time step, with the newest cues (6,): force, m/s^2, angular velocity, rad/s."""
-        change = (cues[3:] - self._rows[1][-1]) / TIME_STEP
-        for rows, newest in zip(self._rows, (cues[:3], cues[3:], change), strict=True):
-            rows[:-1] = rows[1:]
-            rows[-1] = newest
+        change = (cues[3:] - self._moves[1][2]) / TIME_STEP
+        for (earlier, later, last), newest in zip(self._moves, (cues[:3], cues[3:], change), strict=True):
+            earlier[...] = later
+            last[...] = newest
         # The kernels count samples; here the sample they step to is always the same row.
-        self._simulator.state["sample"] = NOW - 1
+        self._samples[self._simulator.current][...] = NOW - 1
         if self._memory is not None:
             self._past = self._poles * self._past + (1.0 - self._poles) * self._scaled()
             self._remember()

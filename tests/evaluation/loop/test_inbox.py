@@ -66,6 +66,12 @@ def test_clocks_may_drift_but_delays_do_not_pass(inbox):
     assert inbox.take(packet(3600, time=1000.0 + 3600.0 * (1.0 - 5e-4) - 0.06), ONE, 3600.0) == "stale"
 
 
+def test_delays_that_last_are_told_for_as_long_as_they_last(inbox):
+    assert inbox.take(packet(0, time=0.0), ONE, 0.0) == "used"
+    for k in range(1, 300):
+        assert inbox.take(packet(k, time=1e-3 * k), ONE, 1e-3 * k + 0.06) == "stale"
+
+
 def test_after_silence_anyone_may_begin_with_any_number(inbox):
     inbox.take(packet(1000), ONE, 0.0)
     assert inbox.take(packet(0), OTHER, 1.0) == "foreign"

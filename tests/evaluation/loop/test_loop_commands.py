@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
+import subprocess
+import sys
 import threading
 from contextlib import contextmanager
 
@@ -83,6 +86,18 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, tmp_path,
     outcome = run_suite(plan.maneuvers, plan.policies, lambda maneuver, drives: None)
     assert list(outcome.maneuvers["log"]) == ["driven"]
     assert outcome.maneuvers["log"]["driven"].cue_error > 0.0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_who_stops_it_gets_its_report(number, tmp_path):
+    words = ["serve", "--policy", "no-motion", "--port", "0", "--report", "told.json", "--log", "log.npz"]
+    program = [sys.executable, "-m", "motion_cueing.evaluation", *words]
+    with subprocess.Popen(program, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as server:
+        assert "UDP 127.0.0.1:" in server.stdout.readline()
+        server.send_signal(number)
+        assert "periods in" in server.stdout.read()
+    assert server.returncode == 0
+    assert load_json(LoopReport, tmp_path / "told.json", "a report", SCHEMA).states["running"] == 0
 
 
 def test_a_replay_needs_its_own_machine_and_cues(tmp_path, capsys):
