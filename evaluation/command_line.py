@@ -67,6 +67,12 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "drive with lag, delay, noise, another car, more fiercely",
         goes_on=True,
     ),
+    "endure": Command(
+        ".endure_command",
+        "EndureCommand",
+        "drive for hours, other cars, slower actuators: is a limit exceeded?",
+        goes_on=True,
+    ),
     "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
     "serve": Command(".serve_command", "ServeCommand", "run a policy as a controller in real time, over UDP"),
     "drive": Command(".drive_command", "DriveCommand", "send a maneuver's cues to such a controller"),

@@ -1,0 +1,82 @@
+"""Legs of a hexapod's pose, in NumPy and on its own: what the machine's step computes is checked with it.
+
+A leg is l = L_IH A - B + S_0 + s, Eq. (12), and its length changes at l . (ds/dt + omega x L_IH A) / |l|.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...envs.platform.machines import Hexapod
+
+Floats = NDArray[np.float64]
+
+
+class Legs(NamedTuple):
+    """Legs of n poses.
+
+    Args:
+        extension: (n, 6) from neutral, m.
+        rate: (n, 6) m/s.
+        clearance: (n,) det of the Jacobian over that at neutral: 0 in a singular pose, negative behind it.
+    """
+
+    extension: Floats
+    rate: Floats
+    clearance: Floats
+
+
+def legs_of(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> Legs:
+    """Legs of poses.
+
+    Args:
+        hexapod: With its joints.
+        pose: (n, 6) displacement from neutral, m; roll, pitch, yaw, rad.
+        pose_rate: (n, 6) their rates.
+    """
+    length, rate, determinant = _legs(hexapod, pose, pose_rate)
+    neutral, _, at_neutral = _legs(hexapod, np.zeros((1, 6)), np.zeros((1, 6)))
+    return Legs(length - neutral, rate, determinant / at_neutral)
+
+
+def _legs(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> tuple[Floats, Floats, Floats]:
+    """Lengths, rates, and the determinant of the Jacobian."""
+    upper, lower = np.array(hexapod.upper_joints), np.array(hexapod.lower_joints)
+    # Places first, poses last: sums over places are then sums of long rows.
+    angles, turning = pose[:, 3:].T, pose_rate[:, 3:].T
+    arm = np.einsum("ijn,kj->kin", _rotation(angles), upper)
+    leg = arm - lower[:, :, None] + (np.array(hexapod.neutral) + pose[:, :3]).T
+    speed = pose_rate[:, :3].T + _cross(_angular_velocity(angles, turning), arm)
+    length = np.sqrt((leg * leg).sum(axis=1))
+    direction = leg / length[:, None]
+    jacobian = np.concatenate([direction, _cross(arm, direction)], axis=1)
+    determinant: Floats = np.linalg.det(np.moveaxis(jacobian, -1, 0))
+    return length.T, (direction * speed).sum(axis=1).T, determinant
+
+
+def _rotation(angles: Floats) -> Floats:
+    """(3, 3, n) Rx(roll) Ry(pitch) Rz(yaw), Eq. (4)."""
+    (sp, st, ss), (cp, ct, cs) = np.sin(angles), np.cos(angles)
+    return np.array(
+        [
+            [ct * cs, -ct * ss, st],
+            [cp * ss + sp * st * cs, cp * cs - sp * st * ss, -sp * ct],
+            [sp * ss - cp * st * cs, sp * cs + cp * st * ss, cp * ct],
+        ]
+    )
+
+
+def _angular_velocity(angles: Floats, rates: Floats) -> Floats:
+    """(3, n) in inertial axes: roll turns about x, pitch about Rx y, yaw about Rx Ry z."""
+    (sp, st, _), (cp, ct, _) = np.sin(angles), np.cos(angles)
+    roll, pitch, yaw = rates
+    return np.array([roll + st * yaw, cp * pitch - sp * ct * yaw, sp * pitch + cp * ct * yaw])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Vector product along the last axis but one."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -2, 0), np.moveaxis(b, -2, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
