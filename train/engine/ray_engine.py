@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import os
 import pickle
+import secrets
 import shutil
+import socket
 import sys
 import tempfile
 import time
@@ -30,6 +32,10 @@ _PATIENCE: Final = 0.2
 """Time between looks at news and Ctrl-C, s."""
 _QUIET: Final = 0.5
 """Least time between reports of a worker without news, s."""
+_STARTS: Final = 3
+"""How often it is tried to start Ray, which gives up after 30 s: on a busy machine that is short."""
+_KNOCK: Final = 10.0
+"""How long an address may take to answer, s; Ray would try for minutes."""
 _STORE: Final = 128 * 2**20
 """Memory for objects, bytes: only configurations and numbers travel. Ray would take a third of all."""
 _ENVIRONMENT: Final = {
@@ -39,8 +45,14 @@ _ENVIRONMENT: Final = {
     # Workers without a GPU are left alone.
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
 }
-_LOOPBACK: Final = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
-"""Ray listens on 127.0.0.1 alone, as it does on Windows and macOS by default."""
+_ALONE: Final = {
+    # Ray listens on 127.0.0.1 alone, as it does on Windows and macOS by default.
+    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
+    # Other users of the machine are kept out, and no token is left in the home folder.
+    "RAY_AUTH_MODE": "token",
+    "RAY_AUTH_TOKEN": secrets.token_hex(32),
+}
+"""Of a Ray that is this process's own."""
 
 
 class RayEngine:
@@ -64,23 +76,24 @@ class RayEngine:
         """Start Ray, or join the cluster.
 
         Raises:
+            ConfigurationError: the address is no HOST:PORT.
             DataError: Ray does not start, or there is no cluster at the address.
         """
-        os.environ.update(_ENVIRONMENT if self._address else {**_ENVIRONMENT, **_LOOPBACK})
+        os.environ.update(_ENVIRONMENT if self._address else {**_ENVIRONMENT, **_ALONE})
         import ray
 
         self._ray = ray
-        try:
-            ray.init(log_to_driver=False, logging_level="CRITICAL", **self._place())
-            self._begin()
-        except Exception as error:
-            self.__exit__(type(error), error, error.__traceback__)
-            where = (
-                f"--address {self._address}: no Ray cluster answers"
-                if self._address
-                else "Ray does not start"
-            )
-            raise DataError(f"{where} ({' '.join(str(error).split())})") from None
+        if self._address:
+            _knock(self._address)
+        for left in reversed(range(1 if self._address else _STARTS)):
+            try:
+                ray.init(log_to_driver=False, logging_level="CRITICAL", **self._place())
+                self._begin()
+                break
+            except Exception as error:
+                self.__exit__(type(error), error, error.__traceback__)
+                if not left:
+                    raise DataError(f"Ray does not start ({' '.join(str(error).split())})") from None
         return self
 
     def _place(self) -> dict[str, Any]:
@@ -161,6 +174,22 @@ class RayEngine:
         except self._ray.exceptions.RayError as error:
             return Ending(error=" ".join(str(error).split()))
         return ending
+
+
+def _knock(address: str) -> None:
+    """Refuse an address where nobody listens.
+
+    Raises:
+        ConfigurationError: it is no HOST:PORT.
+        DataError: nobody does.
+    """
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdigit():
+        raise ConfigurationError(f"--address {address}: expected HOST:PORT, as 10.0.0.5:6379")
+    try:
+        socket.create_connection((host, int(port)), timeout=_KNOCK).close()
+    except (OSError, OverflowError) as error:
+        raise DataError(f"--address {address}: no Ray cluster answers ({error})") from None
 
 
 def _perform(job: Job, desk: Any, arguments: list[str], folder: str) -> Ending:
