@@ -21,7 +21,7 @@ from ..envs.precision import real
 from ..envs.simulator import N_AXES, TIME_STEP, Simulator
 from ..envs.task import EpisodeOptions, RandomisationOptions, TaskOptions
 from ..envs.task.batch import Batch
-from ..envs.task.library import platform_of
+from .own_machine import on_machine
 
 Floats = NDArray[np.float64]
 
@@ -188,7 +188,7 @@ class TaskDriver:
         self, policy: TaskPolicy, cues: CueTrace, platform: Platform | None, vestibular: VestibularModel
     ) -> None:
         if platform is not None:
-            check_machine(policy, platform)
+            policy = on_machine(policy, platform)
         task = deterministic(policy.task, vestibular)
         self._batch = Batch(1, task, drives=[cues], base=getattr(policy, "base_policy", None))
         self.simulator = self._batch.simulator
@@ -210,21 +210,6 @@ class TaskDriver:
             batch.write(action[None])
             for k in batch.play():
                 yield Sample(batch.asked[0], self.simulator.state[0], seconds if k == 0 else np.nan)
-
-
-def check_machine(policy: TaskPolicy, platform: Platform) -> None:
-    """Refuse a machine that a policy was not made for.
-
-    Raises:
-        ConfigurationError: the machine is another one.
-    """
-    own = platform_of(policy.task)
-    if own != platform:
-        name = getattr(policy, "name", type(policy).__name__)
-        raise ConfigurationError(
-            f"{name} was made for the motion base {own.name!r}, not {platform.name!r}; evaluate it on "
-            f"{own.name!r}, or force it, in Python: agent.on(get_platform({platform.name!r}))"
-        )
 
 
 def deterministic(task: TaskOptions, vestibular: VestibularModel) -> TaskOptions:

@@ -10,7 +10,8 @@ from ..envs.errors import UnknownNameError
 from ..envs.platform import Platform
 from ..train.agent import Agent, agent_names, get_agent
 from ..train.agent.files import SUFFIX
-from .drivers import TaskPolicy, check_machine
+from .drivers import TaskPolicy
+from .own_machine import on_machine
 from .selection import is_file
 
 
@@ -20,8 +21,11 @@ def policy_names() -> list[str]:
 
 
 def default_policies(platform: Platform) -> list[str]:
-    """Policies an evaluation compares unless told otherwise; the agents that were made for the machine."""
-    agents = [name for name in agent_names() if get_agent(name).platform == platform]
+    """Policies an evaluation compares unless told otherwise; the agents that were made for the machine.
+
+    Those are also the agents that are told their machine, whichever it is.
+    """
+    agents = [name for name in agent_names() if get_agent(name).told or get_agent(name).platform == platform]
     return [*baselines.default_policies(), *agents]
 
 
@@ -54,9 +58,7 @@ def make_policy(name: str, platform: Platform) -> Policy | TaskPolicy | Foreknow
         ConfigurationError: a field of the file is wrong, or its agent was made for another machine.
     """
     if is_agent(name):
-        agent = find_agent(name)
-        check_machine(agent, platform)
-        return agent
+        return on_machine(find_agent(name), platform)
     try:
         return baselines.make_policy(name, platform)
     except UnknownNameError:

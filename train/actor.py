@@ -159,7 +159,7 @@ def begin_at_rest(actor: Actor, batch: Batch) -> None:
 
     So a training begins with a machine that stays in its travel, and moves at all: every gradient is useful.
     """
-    begin_as(actor, _springs(batch.layout, batch.scale))
+    begin_as(actor, _springs(batch.layout, batch.usual_scale))
 
 
 def begin_as(actor: Actor, gains: NDArray[np.float32]) -> None:

@@ -181,15 +181,16 @@ class TrainingConfig:
 
 
 def validation_task(config: TrainingConfig) -> TaskOptions:
-    """The environment of the validation drives."""
-    given = config.validation
+    """The environment of the validation drives, on machines of their own where builds are drawn."""
+    given, build = config.validation, config.task.randomisation.build
     episode = EpisodeOptions(
         random=config.task.episode.random,
         library=given.drives,
         library_seed=given.seed,
         drive_duration=given.duration,
     )
-    return replace(config.task, episode=episode, randomisation=RandomisationOptions())
+    machines = RandomisationOptions(build=build, machines=given.drives)
+    return replace(config.task, episode=episode, randomisation=machines)
 
 
 def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> TrainingConfig:

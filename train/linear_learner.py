@@ -122,7 +122,7 @@ class LinearLearner:
         return values
 
     def _gains(self, point: Floats) -> NDArray[np.float32]:
-        return gains(washout_at(point), self.batch.layout, self.batch.scale).astype(np.float32)
+        return gains(washout_at(point), self.batch.layout, self.batch.usual_scale).astype(np.float32)
 
     @property
     def washout(self) -> LinearWashout:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..baselines import make_policy
 from ..baselines.policy import ForeknowingPolicy, Policy
 from ..envs.cues import CueTrace
+from ..envs.errors import ConfigurationError
 from ..envs.platform.state import TURNTABLE
 from ..envs.simulator import N_AXES
 from ..envs.task.batch import Batch
@@ -32,10 +33,15 @@ class Teacher:
 
     Raises:
         UnknownNameError: no policy has this name.
-        ConfigurationError: a library that it needs is missing, or a field of the file is wrong.
+        ConfigurationError: a library that it needs is missing, a field of the file is wrong, or the machines
+            are of several builds.
     """
 
     def __init__(self, policy: str, batch: Batch) -> None:
+        if batch.options.randomisation.build is not None:
+            raise ConfigurationError(
+                f"the teacher {policy} is made for one machine; leave randomisation.build out"
+            )
         self._batch = batch
         self._made = make_policy(policy, batch.platform)
         self._drivers: list[Policy] = []

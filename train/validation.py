@@ -87,6 +87,7 @@ def _plain(task: TaskOptions) -> TaskOptions:
         action=ActionOptions(),
         reward=task.reward,
         episode=task.episode,
+        randomisation=task.randomisation,
     )
 
 
@@ -108,7 +109,8 @@ class _Accelerations:
 def _drive(batch: Batch, act: Act) -> Score:
     everywhere, arrays = np.ones(batch.n, dtype=bool), batch.arrays
     batch.seed(everywhere, [0] * batch.n)
-    batch.begin(everywhere, np.arange(batch.n, dtype=np.int32))
+    each = np.arange(batch.n, dtype=np.int32)
+    batch.begin(everywhere, each, each % len(batch.simulator.platforms))
     batch.observe(everywhere)
     running, played = everywhere.copy(), 0
     terms, reward, peak = np.zeros(N_TERMS), 0.0, 0.0

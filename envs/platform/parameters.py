@@ -38,9 +38,18 @@ def geometry_of(hexapod: Hexapod) -> Any:
 def neutral_jacobian(hexapod: Hexapod) -> NDArray[np.float64]:
     """(6, 6) leg rates for the platform's velocity and angular velocity at neutral, where L_IH is unity."""
     upper = np.array(hexapod.upper_joints)
-    legs = upper - np.array(hexapod.lower_joints) + np.array(hexapod.neutral)
-    directions = legs / np.linalg.norm(legs, axis=1, keepdims=True)
-    return np.hstack([directions, np.cross(upper, directions)])
+    return leg_jacobian_of(upper, upper - np.array(hexapod.lower_joints) + np.array(hexapod.neutral))
+
+
+def leg_jacobian_of(upper: NDArray[np.float64], legs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(..., 6, 6) leg rates for the platform's velocity and angular velocity, both in F_V.
+
+    Args:
+        upper: (..., 6, 3) A_i from the origin of F_H, in F_V, m.
+        legs: (..., 6, 3) from B_i to A_i, in F_V, m.
+    """
+    directions = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
+    return np.concatenate([directions, np.cross(upper, directions)], axis=-1)
 
 
 def check_geometry(hexapod: Hexapod) -> None:

@@ -21,13 +21,20 @@ MODES: Final = {"acceleration": 0, "jerk": 1, "velocity": 2, "residual": 3, "gai
 
 
 @wp.struct
-class ActionScale:
-    """What an action of 1 stands for, in the order of ``AXES``."""
+class AxisScale:
+    """What an action of 1 stands for on a machine, in the order of ``AXES``."""
 
-    mode: int
     acceleration: vec9  # m/s^2, rad/s^2
     jerk: vec9  # m/s^3, rad/s^3
     velocity: vec9  # m/s, rad/s
+
+
+@wp.struct
+class ActionScale:
+    """What an action stands for."""
+
+    mode: int
+    axes: wp.array(dtype=AxisScale)  # on each machine
     free: vec9  # 0 for a frozen axis, else 1
     cab_frame: int  # whether an action is turned with the cab's heading
 
@@ -41,12 +48,12 @@ def axis_rates(m: Motion) -> vec9:
 
 
 @wp.func
-def asked(scale: ActionScale, axis: int, u: real, before: real, rate: real, dt: real) -> real:
+def asked(mode: int, scale: AxisScale, axis: int, u: real, before: real, rate: real, dt: real) -> real:
     """Acceleration that an entry of an action asks for; ``before`` is what was asked for a step earlier."""
     largest = scale.acceleration[axis]
-    if scale.mode == JERK:
+    if mode == JERK:
         return wp.clamp(before + scale.jerk[axis] * u * dt, -largest, largest)
-    if scale.mode == VELOCITY:
+    if mode == VELOCITY:
         return wp.clamp((scale.velocity[axis] * u - rate) / dt, -largest, largest)
     return largest * u
 
@@ -71,27 +78,35 @@ def take_action(
 
 @wp.func
 def own_accelerations(
-    scale: ActionScale, m: Motion, now: wp.array2d(dtype=wp.float32), i: int, before: vec9, dt: real
+    scale: ActionScale,
+    which: int,
+    m: Motion,
+    now: wp.array2d(dtype=wp.float32),
+    i: int,
+    before: vec9,
+    dt: real,
 ) -> vec9:
     """The accelerations an action itself asks for in a time step, in its frame.
 
-    ``m`` are the set-points, ``before`` what was asked for in the step before.
+    ``which`` is the number of the machine, ``m`` are its set-points, ``before`` is what was asked for in the
+    step before.
     """
     if scale.mode == GAINS:
         return vec9()
     rates = axis_rates(m)
     if scale.cab_frame != 0:
         rates = to_cab(m, rates)
+    axes = scale.axes[which]
     return vec9(
-        asked(scale, 0, real(now[i, 0]), before[0], rates[0], dt),
-        asked(scale, 1, real(now[i, 1]), before[1], rates[1], dt),
-        asked(scale, 2, real(now[i, 2]), before[2], rates[2], dt),
-        asked(scale, 3, real(now[i, 3]), before[3], rates[3], dt),
-        asked(scale, 4, real(now[i, 4]), before[4], rates[4], dt),
-        asked(scale, 5, real(now[i, 5]), before[5], rates[5], dt),
-        asked(scale, 6, real(now[i, 6]), before[6], rates[6], dt),
-        asked(scale, 7, real(now[i, 7]), before[7], rates[7], dt),
-        asked(scale, 8, real(now[i, 8]), before[8], rates[8], dt),
+        asked(scale.mode, axes, 0, real(now[i, 0]), before[0], rates[0], dt),
+        asked(scale.mode, axes, 1, real(now[i, 1]), before[1], rates[1], dt),
+        asked(scale.mode, axes, 2, real(now[i, 2]), before[2], rates[2], dt),
+        asked(scale.mode, axes, 3, real(now[i, 3]), before[3], rates[3], dt),
+        asked(scale.mode, axes, 4, real(now[i, 4]), before[4], rates[4], dt),
+        asked(scale.mode, axes, 5, real(now[i, 5]), before[5], rates[5], dt),
+        asked(scale.mode, axes, 6, real(now[i, 6]), before[6], rates[6], dt),
+        asked(scale.mode, axes, 7, real(now[i, 7]), before[7], rates[7], dt),
+        asked(scale.mode, axes, 8, real(now[i, 8]), before[8], rates[8], dt),
     )
 
 

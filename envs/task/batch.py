@@ -16,7 +16,7 @@ from ..simulator import TIME_STEP, Simulator
 from ..snapshot import Snapshot, bytes_of, put_bytes
 from . import draws
 from .base import Base
-from .episode import DRIVE, MACHINE, draw, fill_episodes, start_poses, start_samples
+from .episode import DRIVE, MACHINE, draw, fill_episodes, pose_scale, start_poses, start_samples
 from .launches import ALL, CORE, FRAME, NOTHING, BatchArrays, Launches, rules_of
 from .layout import layout_of
 from .library import library_of, machines_of
@@ -25,6 +25,7 @@ from .options import TaskOptions
 from .scaling import acceleration_scale
 
 Mask = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 
 _CONSTANT: Final = ("bounds", "memory")
 """Arrays that are what they were when the batch was made."""
@@ -67,11 +68,13 @@ class Batch:
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
         memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
-        self.scale = acceleration_scale(self.platform) * options.action.authority
+        platforms = self.simulator.platforms
+        self.scales = np.array([acceleration_scale(one) * options.action.authority for one in platforms])
+        self._pose_scales = np.array([pose_scale(one) for one in platforms])
         self.time_step = TIME_STEP * options.action.repeat
         self._lengths = np.array([len(drive) for drive in self.drives])
         self._keys, self._episodes = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.int64)
-        self.rules = rules_of(options, self.layout, self.platform, TIME_STEP)
+        self.rules = rules_of(options, self.layout, platforms, TIME_STEP, self.simulator.device)
         self._launches = Launches(self.simulator, self.arrays, self.rules)
 
     def _library(self, drives: Sequence[CueTrace] | None) -> list[CueTrace]:
@@ -85,13 +88,32 @@ class Batch:
         self._keys[chosen] = [draws.key_of(seeds[i]) for i in chosen.tolist()]
         self._episodes[chosen] = 0
 
-    def begin(self, mask: Mask, drive: ArrayLike | None = None) -> None:
-        """Begin the next episode in the masked environments, in a drawn drive or in the one given (n,)."""
+    @property
+    def scale(self) -> Floats:
+        """(9,) accelerations an action of 1 stands for, m/s^2 and rad/s^2; (n, 9) where machines differ."""
+        if np.all(self.scales == self.scales[0]):
+            return np.array(self.scales[0])
+        return np.array(self.scales[self.simulator.platform_of])
+
+    @property
+    def usual_scale(self) -> Floats:
+        """(9,) median of the scales of the machines that can move an axis; 0 where none can."""
+        moving = np.where(self.scales > 0.0, self.scales, np.nan)
+        moving[:, ~np.any(self.scales > 0.0, axis=0)] = 0.0
+        return np.asarray(np.nanmedian(moving, axis=0))
+
+    def begin(self, mask: Mask, drive: ArrayLike | None = None, machine: ArrayLike | None = None) -> None:
+        """Begin the next episode in the masked environments.
+
+        Args:
+            mask: (n,) which.
+            drive: (n,) index of the drive, instead of a drawn one.
+            machine: (n,) index of the machine, instead of a drawn one.
+        """
         words = draw(self._keys[mask], self._episodes[mask])
         self._episodes[mask] += 1
-        drive_of = self._chosen(words[:, DRIVE], len(self.drives))
-        if drive is not None:
-            drive_of = np.broadcast_to(np.asarray(drive, dtype=np.int32), (self.n,))[mask]
+        drive_of = self._chosen(words[:, DRIVE], len(self.drives), drive, mask)
+        machine_of = self._chosen(words[:, MACHINE], len(self.scales), machine, mask)
         options = self.options
         first, last = start_samples(words, self._lengths[drive_of], options.episode, TIME_STEP)
         fill_episodes(self.arrays.episode.view, mask, words, last, options.randomisation)
@@ -99,9 +121,9 @@ class Batch:
         self._place(
             mask,
             drive_of=drive_of,
-            machine_of=self._chosen(words[:, MACHINE], len(self.simulator.platforms)),
+            machine_of=machine_of,
             sample=first,
-            start=start_poses(words, self.platform, options.episode.platform_offset),
+            start=start_poses(words, self._pose_scales[machine_of], options.episode.platform_offset),
         )
 
     def _place(self, mask: Mask, **drawn: NDArray[Any]) -> None:
@@ -118,8 +140,12 @@ class Batch:
         self.arrays.begins.view[...] = begins
         self.arrays.begins.push()
 
-    @staticmethod
-    def _chosen(words: NDArray[np.uint64], count: int) -> NDArray[np.int32]:
+    def _chosen(
+        self, words: NDArray[np.uint64], count: int, given: ArrayLike | None, mask: Mask
+    ) -> NDArray[np.int32]:
+        """Indices below ``count`` for the masked environments, drawn unless they are given (n,)."""
+        if given is not None:
+            return np.broadcast_to(np.asarray(given, dtype=np.int32), (self.n,))[mask]
         return np.floor(draws.uniform(words) * count).astype(np.int32)
 
     def step(self) -> None:

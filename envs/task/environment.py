@@ -78,11 +78,11 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
     @property
     def scale(self) -> NDArray[np.float64]:
         """(9,) accelerations that an action of 1 stands for, m/s^2 and rad/s^2."""
-        return self.batch.scale
+        return np.array(np.atleast_2d(self.batch.scale)[0])
 
     def action_of(self, acceleration: ArrayLike) -> Action:
         """Actions of the mode "acceleration" for accelerations (..., 9); 0 on axes that cannot move."""
-        return normalised(acceleration, self.batch.scale)
+        return normalised(acceleration, self.scale)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -152,12 +152,13 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
 
 
 def normalised(acceleration: ArrayLike, scale: NDArray[np.float64]) -> Action:
-    """Actions (..., 9) for accelerations in SI units; 0 where the scale is 0.
+    """Actions (..., 9) for accelerations in SI units and their scale (9,) or (n, 9); 0 where it is 0.
 
     Raises:
         ActionError: not nine accelerations.
     """
     values = np.asarray(acceleration, dtype=np.float64)
-    if values.shape[-1:] != scale.shape:
-        raise ActionError(f"accelerations have shape {values.shape}, expected (..., {len(scale)})")
-    return np.divide(values, scale, out=np.zeros_like(values), where=scale > 0.0).astype(np.float32)
+    if values.shape[-1:] != scale.shape[-1:]:
+        raise ActionError(f"accelerations have shape {values.shape}, expected (..., {scale.shape[-1]})")
+    out = np.zeros(np.broadcast_shapes(values.shape, scale.shape))
+    return np.divide(values, scale, out=out, where=scale > 0.0).astype(np.float32)

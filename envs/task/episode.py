@@ -54,17 +54,18 @@ def start_samples(
     return first.astype(np.int32), (first + steps).astype(np.int32)
 
 
-def start_poses(words: NDArray[np.uint64], platform: Platform, share: float) -> Floats:
-    """(n, 9) poses within a share of the machine's travel, in the order of ``AXES``.
+def start_poses(words: NDArray[np.uint64], scale: Floats, share: float) -> Floats:
+    """(n, 9) poses within a share of each machine's :func:`pose_scale` (n, 9), in the order of ``AXES``."""
+    signed = share * (2.0 * draws.uniform(words[:, POSE]) - 1.0)
+    return np.asarray(signed * scale)
+
+
+def pose_scale(platform: Platform) -> Floats:
+    """(9,) largest absolute values of start poses, m and rad, in the order of ``AXES``.
 
     Half of the legs' share goes to displacement, half to tilt: a displacement s changes no leg by more
     than |s|, and angles change none by more than their sum times the largest distance of a joint.
     """
-    signed = share * (2.0 * draws.uniform(words[:, POSE]) - 1.0)
-    return signed * _pose_scale(platform)
-
-
-def _pose_scale(platform: Platform) -> Floats:
     carriage, hexapod, turntable = platform.carriage, platform.hexapod, platform.turntable
     scale = np.zeros(9)
     if carriage is not None:

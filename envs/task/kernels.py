@@ -66,12 +66,12 @@ class Arrays:
 
 
 @wp.func
-def commanded(rules: Rules, a: Arrays, s: State, i: int, first: int) -> vec9:
+def commanded(rules: Rules, a: Arrays, which: int, s: State, i: int, first: int) -> vec9:
     """Accelerations of a time step, the first of an action or a later one."""
     c = a.command[i]
     if first != 0:
         c.clipped = take_action(a.action, a.now, a.before, i)
-    c.own = own_accelerations(rules.action, s.setpoint, a.now, i, c.own, rules.dt)
+    c.own = own_accelerations(rules.action, which, s.setpoint, a.now, i, c.own, rules.dt)
     c.asked = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
     a.command[i] = c
     return wp.cw_mul(c.asked, a.episode[i].actuator_gain)
@@ -99,7 +99,15 @@ def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> 
 
 @wp.func
 def look_at(
-    rules: Rules, a: Arrays, drives: Drives, drive: int, m: Machine, s: State, i: int, parts: int
+    rules: Rules,
+    a: Arrays,
+    drives: Drives,
+    drive: int,
+    which: int,
+    m: Machine,
+    s: State,
+    i: int,
+    parts: int,
 ) -> int:
     """Write the observation of an environment, or parts of it."""
     if parts & CORE:
@@ -112,6 +120,7 @@ def look_at(
             drives,
             drive,
             a.episode[i],
+            which,
             m,
             s,
             a.fixed,
@@ -144,15 +153,16 @@ def play(
 ) -> None:
     """One time step: ``first`` says whether an action begins, ``parts`` what of the observation is made."""
     i = wp.tid()
-    m = machines[machine_of[i]]
+    which = machine_of[i]
+    m = machines[which]
     s = state[i]
-    acceleration = commanded(rules, a, s, i, first)
+    acceleration = commanded(rules, a, which, s, i, first)
     after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, acceleration, rules.dt)
     if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
     judge(rules, a, m, after, i, first)
-    look_at(rules, a, drives, drive_of[i], m, after, i, parts)
+    look_at(rules, a, drives, drive_of[i], which, m, after, i, parts)
 
 
 @wp.kernel(enable_backward=False, module="unique")
@@ -172,7 +182,8 @@ def look(
     begins = a.begins[i]
     if only_begins != 0 and not begins:
         return
-    look_at(rules, a, drives, drive_of[i], machines[machine_of[i]], state[i], i, parts)
+    which = machine_of[i]
+    look_at(rules, a, drives, drive_of[i], which, machines[which], state[i], i, parts)
     if begins and parts & FRAME:
         repeat_frame(a.observation, i, rules.places.frame)
 

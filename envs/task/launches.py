@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +14,8 @@ from ..observation import OBSERVATION_SIZE
 from ..platform.machines import Platform
 from ..precision import real, vec9
 from ..simulator import Simulator
-from .act_kernel import MODES, ActionScale
+from .ability import ability_of
+from .act_kernel import MODES, ActionScale, AxisScale
 from .episode import Episode
 from .kernels import Arrays, Command, Rules, forget, look, play
 from .layout import Layout
@@ -83,23 +85,36 @@ class BatchArrays:
         return arrays
 
 
-def action_scale(platform: Platform, options: ActionOptions) -> Any:
-    """The kernel's form of what an action of 1 stands for."""
-    scale: Any = ActionScale()
+def axis_scale(platform: Platform, options: ActionOptions) -> Any:
+    """The kernel's form of what an action of 1 stands for on a machine."""
+    scale: Any = AxisScale()
     largest: NDArray[np.float64] = acceleration_scale(platform) * options.authority
-    scale.mode = MODES[options.mode]
     scale.acceleration, scale.jerk = vec9(*largest), vec9(*largest / options.rise_time)
-    scale.velocity, scale.free = vec9(*velocity_scale(platform)), vec9(*free_axes(options.frozen))
+    scale.velocity = vec9(*velocity_scale(platform))
+    return scale
+
+
+def action_scale(platforms: Sequence[Platform], options: ActionOptions, device: Any) -> Any:
+    """The kernel's form of what an action stands for."""
+    scale: Any = ActionScale()
+    scale.mode, scale.free = MODES[options.mode], vec9(*free_axes(options.frozen))
+    axes = [axis_scale(platform, options) for platform in platforms]
+    scale.axes = wp.array(axes, dtype=AxisScale, device=device)
     scale.cab_frame = int(options.frame == "cab")
     return scale
 
 
-def rules_of(options: TaskOptions, layout: Layout, platform: Platform, dt: float) -> Any:
+def rules_of(
+    options: TaskOptions, layout: Layout, platforms: Sequence[Platform], dt: float, device: Any
+) -> Any:
     """What is the same for a whole batch, as the kernels read it."""
     rules: Any = Rules()
-    rules.action = action_scale(platform, options.action)
+    rules.action = action_scale(platforms, options.action, device)
     rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
     rules.places = places_of(layout, options.observation, dt, options.randomisation)
+    if options.observation.machine:
+        abilities = np.array([ability_of(platform) for platform in platforms])
+        rules.places.abilities = wp.array(abilities, dtype=wp.float32, device=device)
     rules.share, rules.dt = 1.0 / options.action.repeat, dt
     return rules
 

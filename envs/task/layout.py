@@ -38,6 +38,26 @@ TRUE_MOTION: Final = (
 )
 """Rows of ``true_motion``."""
 
+MACHINE: Final = (
+    Row("carriage_travel", 4, 10.0, "m", "how far carriage x goes down and up, then y"),
+    Row("carriage_top_speed", 1, 5.0, "m/s", "its largest speed"),
+    Row("carriage_top_acceleration", 1, 10.0, "m/s^2", "its largest acceleration"),
+    Row(
+        "displacement_reach", 6, 1.0, "m", "how far surge, sway and heave go by themselves, each down and up"
+    ),
+    Row("beta_reach", 6, 1.0, "rad", "how far roll, pitch and yaw go by themselves, each down and up"),
+    Row("hexapod_top_speed", 6, 1.0, "m/s, rad/s", "largest speed of each axis by itself at neutral"),
+    Row("hexapod_top_acceleration", 6, 10.0, "m/s^2, rad/s^2", "largest acceleration of each, likewise"),
+    Row("turntable_kind", 2, 1.0, "1", "1 for a turntable, 1 for one without ends", 1.0),
+    Row("turntable_travel", 2, 5.0, "rad", "how far it turns down and up; one turn where it has no ends"),
+    Row("turntable_top_speed", 1, 1.0, "rad/s", "its largest speed"),
+    Row("turntable_top_acceleration", 1, 1.0, "rad/s^2", "its largest acceleration"),
+)
+"""Rows of ``machine`` that do not change; 0 for what the machine does not have."""
+
+TRAVEL_USED: Final = Row("travel_used", 3, 1.0, "1", "carriage x, y and turntable over the end ahead of them")
+"""Row of ``machine`` that changes."""
+
 COMMAND: Final = Row("command", 9, 10.0, "m/s^2, rad/s^2", "accelerations last asked for")
 """Row of the action mode "jerk"."""
 
@@ -114,4 +134,6 @@ def layout_of(options: ObservationOptions, mode: Mode, action_size: int) -> Layo
         rows += PERCEIVED
     if options.true_motion:
         rows += TRUE_MOTION
+    if options.machine:
+        rows += [*MACHINE, TRAVEL_USED]
     return Layout(tuple(rows), options.stack)

@@ -14,12 +14,14 @@ from ..car.simulation import Plan, simulate
 from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..platform.actuators import ActuatorDynamics
+from ..platform.builds import drawn_machine
 from ..platform.machines import Platform
 from ..platform.presets import get_platform
 from .options import EpisodeOptions, RandomisationOptions, TaskOptions
 
 _FRICTION_STREAM: Final = 1
 _MACHINE_STREAM: Final = 2
+_BUILD_STREAM: Final = 3
 
 
 def slippery(car: Car, factor: float) -> Car:
@@ -92,12 +94,21 @@ def platform_of(options: TaskOptions) -> Platform:
 
 
 def machines_of(options: TaskOptions) -> list[Platform]:
-    """The machines that episodes draw from: the platform, or variants of it with drawn dynamics."""
-    platform, ranges = platform_of(options), options.randomisation
-    if ranges.natural_frequency is None and ranges.dead_time is None:
+    """The machines that episodes draw from: the platform, or variants of it, drawn.
+
+    Raises:
+        ConfigurationError: no machine of the builds asked for closes.
+    """
+    platform, ranges, seed = platform_of(options), options.randomisation, options.episode.library_seed
+    if ranges.natural_frequency is None and ranges.dead_time is None and ranges.build is None:
         return [platform]
-    rng = np.random.default_rng((options.episode.library_seed, _MACHINE_STREAM))
-    return [_variant(platform, ranges, rng) for _ in range(ranges.machines)]
+    machines = [platform] * ranges.machines
+    if ranges.build is not None:
+        rng = np.random.default_rng((seed, _BUILD_STREAM))
+        names = [f"{platform.name}-{k}" for k in range(ranges.machines)]
+        machines = [drawn_machine(platform, ranges.build, rng, name) for name in names]
+    rng = np.random.default_rng((seed, _MACHINE_STREAM))
+    return [_variant(machine, ranges, rng) for machine in machines]
 
 
 def _variant(platform: Platform, ranges: RandomisationOptions, rng: np.random.Generator) -> Platform:

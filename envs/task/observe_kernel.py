@@ -11,9 +11,11 @@ from ..observation import SCALES, SLICES, write_observation
 from ..platform.state import Machine, Motion
 from ..precision import real, vec3, vec9
 from ..state import Drives, State
+from .ability_kernel import put_abilities, put_travel_used
+from .entries import put_entry, put_vector
 from .episode import Episode
 from .heading import motion_in_cab, to_cab
-from .layout import Layout
+from .layout import MACHINE, Layout
 from .options import ObservationOptions, RandomisationOptions
 
 FORCE = wp.constant(real(SCALES["wanted_force"]))
@@ -40,51 +42,29 @@ class Places:
     memory: int
     perceived: int
     true_motion: int
+    machine: int
+    travel_used: int
     preview_samples: int
     preview_stride: int  # time steps between samples
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
     force_noise: real  # m/s^2
     rate_noise: real  # rad/s
+    abilities: wp.array2d(dtype=wp.float32)  # what each machine can do, the constant rows
 
 
 def places_of(layout: Layout, seen: ObservationOptions, dt: float, noise: RandomisationOptions) -> Any:
-    """The kernel's form of a layout."""
+    """The kernel's form of a layout, but for what machines can do."""
     places: Any = Places()
     places.frame = layout.frame
     for name in ("force_error", "rate_error", "last_action", "command", "base_action", "preview", "memory"):
         setattr(places, name, layout.first(name))
     places.perceived, places.true_motion = layout.first("sensed_wanted_force"), layout.first("true_carriage")
+    places.machine, places.travel_used = layout.first(MACHINE[0].name), layout.first("travel_used")
     places.preview_samples = seen.preview
     places.preview_stride = max(1, round(seen.preview_spacing / dt))
     places.cab_frame = int(seen.frame == "cab")
     places.force_noise, places.rate_noise = noise.force_noise, noise.rate_noise
     return places
-
-
-@wp.func
-def put_entry(
-    out: wp.array2d(dtype=wp.float32), i: int, k: int, value: real, bounds: wp.array(dtype=wp.float32)
-) -> int:
-    """Write an entry, clipped to its bound."""
-    # Once only: an entry that is written twice would count twice in the adjoint.
-    out[i, k] = wp.clamp(wp.float32(value), -bounds[k], bounds[k])
-    return k + 1
-
-
-@wp.func
-def put_vector(
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
-    first: int,
-    value: Any,
-    size: int,
-    scale: real,
-    bounds: wp.array(dtype=wp.float32),
-) -> int:
-    """Write ``size`` entries from ``first`` on; returns where the next row begins."""
-    for k in range(size):
-        put_entry(out, i, first + k, value[k] / scale, bounds)
-    return first + size
 
 
 @wp.func
@@ -228,6 +208,7 @@ def write_frame(
     drives: Drives,
     drive: int,
     e: Episode,
+    which: int,
     machine: Machine,
     s: State,
     fixed: wp.array2d(dtype=real),
@@ -239,7 +220,10 @@ def write_frame(
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """The newest frame of an environment's observation; ``fixed`` gets the fixed rows it is made of."""
+    """The newest frame of an environment's observation; ``fixed`` gets the fixed rows it is made of.
+
+    ``which`` is the number of the machine.
+    """
     seen = seen_motion(p, s.setpoint)
     write_observation(machine, s, seen, seen_axes(p, s.setpoint, s.acceleration), fixed, i)
     put_fixed(p, e, s.sample, fixed, bounds, out, i)
@@ -258,4 +242,7 @@ def write_frame(
         put_cues(out, i, k, s.sensed_felt.force, s.sensed_felt.rate, bounds)
     if p.true_motion >= 0:
         put_motion(out, i, p.true_motion, seen_motion(p, s.motion), bounds)
+    if p.machine >= 0:
+        put_abilities(p.abilities, which, p.machine, bounds, out, i)
+        put_travel_used(machine, s.setpoint, p.cab_frame, p.travel_used, bounds, out, i)
     return p.frame

@@ -12,6 +12,7 @@ from ..car import RandomDrives, maneuver_names, recording_names
 from ..cue_cost import CueCost
 from ..errors import UnknownNameError
 from ..perception.models import vestibular_model_names
+from ..platform.builds import BuildRanges
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, platform_names
 from ..platform.state import AXES
@@ -51,6 +52,8 @@ class ObservationOptions:
             of its own knows of the past.
         frame: Axes of the machine's rows: "machine", or "cab": turned with the cab's heading, so that what
             is ahead of the driver looks the same wherever the turntable stands.
+        machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
+            A policy that is told this runs on any machine.
     """
 
     preview: Count = 0
@@ -60,6 +63,7 @@ class ObservationOptions:
     stack: PositiveCount = 1
     memory: tuple[Positive, ...] = ()
     frame: Frame = "machine"
+    machine: bool = False
 
 
 @configuration
@@ -177,7 +181,8 @@ class RandomisationOptions:
         friction: Range of a factor on the tires' friction, drawn for each drive of the library.
         natural_frequency: Range of the actuators' lag, rad/s; None leaves the platform's own.
         dead_time: Range of the actuators' dead time, s; None leaves the platform's own.
-        machines: Machines to draw from, if lag or dead time are drawn.
+        build: How the machines themselves differ; None leaves the platform as it is.
+        machines: Machines to draw from, if build, lag or dead time are drawn.
         actuator_gain: Largest relative error of the acceleration of each axis.
         sensor_gain: Largest relative error of the cab's accelerometers and gyroscopes.
         force_noise: Standard deviation of the noise of the cab's accelerometers, m/s^2.
@@ -187,6 +192,7 @@ class RandomisationOptions:
     friction: tuple[Positive, Positive] = (1.0, 1.0)
     natural_frequency: tuple[Positive, Positive] | None = None
     dead_time: tuple[NonNegative, NonNegative] | None = None
+    build: BuildRanges | None = None
     machines: PositiveCount = 16
     actuator_gain: Share = 0.0
     sensor_gain: Share = 0.0

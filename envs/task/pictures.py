@@ -34,7 +34,10 @@ class Pictures:
 
     def __init__(self, batch: Batch, mode: str, size: tuple[int, int] | None = None) -> None:
         self._batch, self._human = batch, mode == "human"
-        self._renderer = Renderer(batch.platform, size or (SIZE if self._human else FRAME_SIZE))
+        self._size = size or (SIZE if self._human else FRAME_SIZE)
+        self._renderer = Renderer(batch.platform, self._size)
+        # One for each machine that looks different; the first also has the window.
+        self._renderers = {0: self._renderer}
         self.hold = max(1, round(1.0 / (FRAMES_PER_SECOND * batch.time_step)))
         """Steps between two frames."""
         self._views = [_View(batch.time_step) for _ in range(1 if self._human else batch.n)]
@@ -72,10 +75,19 @@ class Pictures:
         """The frame (height, width, 3) of an environment."""
         view = self._views[i]
         if view.frame is None or view.due(self.hold):
-            view.frame = self._renderer.frame(motion_of(self._batch.simulator.state[i]), view.cues)
+            view.frame = self._renderer_of(i).frame(motion_of(self._batch.simulator.state[i]), view.cues)
             view.frame.setflags(write=False)
             view.age = 0
         return view.frame
+
+    def _renderer_of(self, i: int) -> Renderer:
+        """Draws the machine of an environment."""
+        simulator = self._batch.simulator
+        several = self._batch.options.randomisation.build is not None
+        which = int(simulator.platform_of[i]) if several else 0
+        if which not in self._renderers:
+            self._renderers[which] = Renderer(simulator.platforms[which], self._size)
+        return self._renderers[which]
 
     def render(self) -> tuple[Picture, ...] | None:
         """The frame of each environment; None in the mode "human", where steps show themselves."""

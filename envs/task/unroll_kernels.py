@@ -46,9 +46,10 @@ def play_with_adjoint(
 ) -> None:
     """One time step; adds its terms, and minus its reward to the cost. ``now`` lies within [-1, 1]."""
     i = wp.tid()
-    m = machines[machine_of[i]]
+    which = machine_of[i]
+    m = machines[which]
     s = state[i]
-    asked = own_accelerations(rules.action, s.setpoint, now, i, own[i], rules.dt)
+    asked = own_accelerations(rules.action, which, s.setpoint, now, i, own[i], rules.dt)
     own_out[i] = asked
     wanted = wp.cw_mul(
         applied_accelerations(rules.action, s.setpoint, asked, vec9()), episodes[i].actuator_gain
@@ -88,6 +89,7 @@ def look_with_adjoint(
         drives,
         drive_of[i],
         episodes[i],
+        machine_of[i],
         machines[machine_of[i]],
         state[i],
         fixed,

@@ -91,7 +91,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
 
     @property
     def scale(self) -> NDArray[np.float64]:
-        """(9,) accelerations that an action of 1 stands for, m/s^2 and rad/s^2."""
+        """(9,) accelerations that an action of 1 stands for, m/s^2, rad/s^2; (n, 9) where machines differ."""
         return self.batch.scale
 
     def action_of(self, acceleration: ArrayLike) -> NDArray[np.float32]:

@@ -21,7 +21,8 @@ from ...envs.perception import VestibularModel, get_vestibular_model
 from ...envs.platform import Platform
 from ...envs.simulator import N_AXES, TIME_STEP, Simulator
 from ...envs.task.batch import Batch
-from ..drivers import Asked, Observer, TaskPolicy, check_machine, deterministic
+from ..drivers import Asked, Observer, TaskPolicy, deterministic
+from ..own_machine import on_machine
 from ..suite import explain
 from .live_cues import AT_REST, NOW, LiveCues, standing
 from .track import MotionView
@@ -156,7 +157,7 @@ class TaskMachine(LiveMachine):
     """For a policy that sees an environment and acts in it."""
 
     def __init__(self, policy: TaskPolicy, platform: Platform, vestibular: VestibularModel) -> None:
-        check_machine(policy, platform)
+        policy = on_machine(policy, platform)
         task = deterministic(policy.task, vestibular)
         stride = max(1, round(task.observation.preview_spacing / TIME_STEP))
         self.ahead_steps = task.observation.preview * stride

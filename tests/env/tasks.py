@@ -10,6 +10,7 @@ import numpy as np
 from motion_cueing.baselines.washout import ClassicalWashout, ScheduledWashout
 from motion_cueing.envs.car import RandomDrives
 from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.platform.builds import BuildRanges
 from motion_cueing.envs.task import (
     ActionOptions,
     EpisodeOptions,
@@ -26,6 +27,7 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     "preview": {"observation": ObservationOptions(preview=5, preview_spacing=0.1)},
     "perceived": {"observation": ObservationOptions(perceived=True)},
     "true motion": {"observation": ObservationOptions(true_motion=True)},
+    "told machine": {"observation": ObservationOptions(machine=True)},
     "stack": {"observation": ObservationOptions(stack=3)},
     "jerk": {"action": ActionOptions(mode="jerk")},
     "velocity": {"action": ActionOptions(mode="velocity")},
@@ -47,6 +49,12 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
         "randomisation": RandomisationOptions(
             natural_frequency=(20.0, 60.0), dead_time=(0.0, 0.05), machines=3
         )
+    },
+    "builds": {
+        "observation": ObservationOptions(machine=True),
+        "randomisation": RandomisationOptions(
+            build=BuildRanges(travel=(0.5, 1.0), size=(0.4, 1.0), without_carriage=0.5), machines=3
+        ),
     },
     "sensors": {
         "randomisation": RandomisationOptions(

@@ -23,7 +23,7 @@ def act_and_judge(
     acceleration: wp.array(dtype=vec9),
 ):
     i = wp.tid()
-    acceleration[i] = commanded(rules, a, state[i], i, 1)
+    acceleration[i] = commanded(rules, a, 0, state[i], i, 1)
     judge(rules, a, machines[0], state[i], i, 1)
 
 

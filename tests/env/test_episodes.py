@@ -16,7 +16,7 @@ from motion_cueing.envs.task import (
     RandomisationOptions,
 )
 from motion_cueing.envs.task.draws import key_of, uniform, words
-from motion_cueing.envs.task.episode import draw, start_poses
+from motion_cueing.envs.task.episode import draw, pose_scale, start_poses
 
 from .tasks import drive
 
@@ -131,7 +131,7 @@ def test_machines_have_drawn_lags_and_dead_times_within_their_ranges():
 def test_start_poses_lie_within_their_share_of_the_travel(name):
     platform = get_platform(name)
     keys = np.array([key_of(seed) for seed in range(300)], dtype=np.uint64)
-    poses = start_poses(draw(keys, np.zeros(300, dtype=np.int64)), platform, 0.9)
+    poses = start_poses(draw(keys, np.zeros(300, dtype=np.int64)), pose_scale(platform), 0.9)
     least, most = platform.hexapod.extension
     for pose in poses:
         legs = np.array(legs_of_pose(platform.hexapod, pose[2:8]))

@@ -14,7 +14,9 @@ from motion_cueing.envs.task.layout import (
     BASE,
     COMMAND,
     DIFFERENCE,
+    MACHINE,
     PERCEIVED,
+    TRAVEL_USED,
     TRUE_MOTION,
     last_action_row,
     memory_row,
@@ -264,6 +266,8 @@ def test_page_tells_every_row_as_it_is():
         memory_row(1),
         *PERCEIVED,
         *TRUE_MOTION,
+        *MACHINE,
+        TRAVEL_USED,
     ]
     expected = []
     for r in rows:

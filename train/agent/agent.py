@@ -72,6 +72,11 @@ class Agent:
         return platform_of(self.task)
 
     @property
+    def told(self) -> bool:
+        """Whether it is told its machine, and so runs on any."""
+        return self.task.observation.machine
+
+    @property
     def action_size(self) -> int:
         """Entries of an action."""
         return len(KNOBS) if self.task.action.mode == "gains" else len(AXES)
@@ -89,8 +94,8 @@ class Agent:
     @property
     def description(self) -> str:
         """One line for people."""
-        mode, machine = self.task.action.mode, self.platform.name
-        return f"agent by {self.record.algo} for the motion base {machine}, action {mode}"
+        base = "any motion base, which it is told" if self.told else f"the motion base {self.platform.name}"
+        return f"agent by {self.record.algo} for {base}, action {self.task.action.mode}"
 
     @cached_property
     def base_policy(self) -> ClassicalWashout | None:
@@ -120,7 +125,7 @@ class Agent:
         return self.network(values), state
 
     def on(self, platform: Platform | str) -> Agent:
-        """The same agent on another machine than it was trained on, which is no fair test of it."""
+        """The same agent on another machine than it was trained on: no fair test of it, unless it is told."""
         return replace(self, task=replace(self.task, platform=platform))
 
     def save(self, path: str | Path) -> None:

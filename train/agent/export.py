@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...envs.errors import MotionCueingError
 from ...envs.settings import to_dict
 from ...envs.storage import write_bytes
+from ...envs.task.ability import abilities
 from ...envs.task.scaling import acceleration_scale
 from .agent import Agent
 from .network import Array, Network
@@ -135,10 +136,18 @@ def metadata(agent: Agent) -> dict[str, str]:
         "rows": [asdict(row) for row in agent.layout.rows],
         "stack": agent.layout.stack,
         "action": action,
+        "machine": abilities_of(agent),
         "task": to_dict(agent.task),
         "record": to_dict(agent.record),
     }
     return {"name": agent.name} | {key: json.dumps(value) for key, value in values.items()}
+
+
+def abilities_of(agent: Agent) -> dict[str, list[float]]:
+    """What an agent that is told its machine sees of it, in SI units; nothing for any other."""
+    if not agent.told:
+        return {}
+    return {name: values.tolist() for name, values in abilities(agent.platform).items()}
 
 
 def _described(proto: Any, onnx: ModuleType, agent: Agent) -> bytes:
