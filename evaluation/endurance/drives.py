@@ -41,9 +41,13 @@ def seeded_drives(endurance: Endurance, seeds: Sequence[int]) -> list[SeededDriv
     """The drives of seeds; those whose car leaves the range of its model are left out.
 
     A car that slides off its path stays: its driver feels that, too.
+
+    Raises:
+        ConfigurationError: a seed or the duration is out of range.
     """
+    plans = [endurance.drives.plan(seed, endurance.duration) for seed in seeds]
     frictions = [_friction(endurance, seed) for seed in seeds]
-    plans = [_plan(endurance, seed, friction) for seed, friction in zip(seeds, frictions, strict=True)]
+    plans = [replace(p, car=slippery(p.car, factor)) for p, factor in zip(plans, frictions, strict=True)]
     return [
         SeededDrive(seed, plan.car.name, friction, _machine(endurance, seed), cues)
         for seed, friction, plan, cues in zip(seeds, frictions, plans, _driven(plans), strict=True)
@@ -57,11 +61,6 @@ def _friction(endurance: Endurance, seed: int) -> float:
 
 def _machine(endurance: Endurance, seed: int) -> int:
     return int(np.random.default_rng((seed, _MACHINE_STREAM)).integers(endurance.machines))
-
-
-def _plan(endurance: Endurance, seed: int, friction: float) -> Plan:
-    plan = endurance.drives.plan(seed, endurance.duration)
-    return replace(plan, car=slippery(plan.car, friction))
 
 
 def _driven(plans: Sequence[Plan]) -> list[CueTrace | None]:

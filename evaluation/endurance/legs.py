@@ -53,7 +53,8 @@ def _legs(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> tuple[Floats, Fl
     length = np.sqrt((leg * leg).sum(axis=1))
     direction = leg / length[:, None]
     jacobian = np.concatenate([direction, _cross(arm, direction)], axis=1)
-    determinant: Floats = np.linalg.det(np.moveaxis(jacobian, -1, 0))
+    with np.errstate(invalid="ignore"):
+        determinant: Floats = np.linalg.det(np.moveaxis(jacobian, -1, 0))
     return length.T, (direction * speed).sum(axis=1).T, determinant
 
 
