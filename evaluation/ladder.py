@@ -21,6 +21,7 @@ LADDER: Final = (
     "adaptive-tuned",
     "mpc",
     "nmpc",
+    "learned",
     "mpc-preview",
     "nmpc-preview",
     "mpc-full",

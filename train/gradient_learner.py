@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ..envs.car import drive_seeds
 from ..envs.errors import ConfigurationError
 from ..envs.settings import Positive, configuration, from_dict
 from ..envs.task.batch import Batch
@@ -89,7 +90,7 @@ class GradientLearner:
         torch.manual_seed(config.seed)
         self._total, n = config.steps, config.n_envs
         self.batch = Batch(n, config.task, device=config.device)
-        everywhere, seeds = np.ones(n, dtype=bool), [config.seed + i for i in range(n)]
+        everywhere, seeds = np.ones(n, dtype=bool), drive_seeds(n, config.seed)
         self.batch.seed(everywhere, seeds)
         self._episode = round(float(config.task.episode.duration or 0.0) / self.batch.time_step)
         window = self.given.window

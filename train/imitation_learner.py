@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from pydantic import Field
 
+from ..envs.car import drive_seeds
 from ..envs.errors import ConfigurationError
 from ..envs.settings import Positive, configuration, from_dict
 from ..envs.task.batch import Batch
@@ -89,7 +90,7 @@ class ImitationLearner:
         own_time_step = replace(config.task, action=replace(config.task.action, repeat=1))
         self.batch = Batch(n, own_time_step)
         self._everywhere = np.ones(n, dtype=bool)
-        self.batch.seed(self._everywhere, [config.seed + i for i in range(n)])
+        self.batch.seed(self._everywhere, drive_seeds(n, config.seed))
         duration = float(config.task.episode.duration or 0.0)
         self._length = round(duration / (self.batch.time_step * self._repeat))
         self.teacher = Teacher(self.given.teacher, self.batch)
