@@ -14,7 +14,7 @@ from .singularity import NEARLY_SINGULAR
 
 Floats = NDArray[np.float64]
 
-_POSES: Final = 101
+_POSES: Final = 61
 """Poses looked at on the way, so that the first that is out of reach is found."""
 
 _LOOKS: Final = 4

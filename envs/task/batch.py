@@ -22,7 +22,7 @@ from .layout import layout_of
 from .library import library_of, machines_of
 from .memory import low_passed
 from .options import TaskOptions
-from .scaling import acceleration_scale
+from .scaling import action_scale
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ class Batch:
         memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
         platforms = self.simulator.platforms
-        self.scales = np.array([acceleration_scale(one) * options.action.authority for one in platforms])
+        self.scales = np.array([action_scale(one, options.action) for one in platforms])
         self._pose_scales = np.array([pose_scale(one) for one in platforms])
         self.time_step = TIME_STEP * options.action.repeat
         self._lengths = np.array([len(drive) for drive in self.drives])

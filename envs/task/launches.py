@@ -22,7 +22,7 @@ from .layout import Layout
 from .observe_kernel import places_of
 from .options import ActionOptions, TaskOptions
 from .reward_kernel import reward_scale, vec_terms
-from .scaling import acceleration_scale, free_axes, velocity_scale
+from .scaling import action_scale, free_axes, velocity_scale
 
 NOTHING, CORE, FRAME, ALL = range(4)
 """Parts of an observation, as the kernels number them."""
@@ -85,20 +85,20 @@ class BatchArrays:
         return arrays
 
 
-def axis_scale(platform: Platform, options: ActionOptions) -> Any:
+def _axis_scale(platform: Platform, options: ActionOptions) -> Any:
     """The kernel's form of what an action of 1 stands for on a machine."""
     scale: Any = AxisScale()
-    largest: NDArray[np.float64] = acceleration_scale(platform) * options.authority
+    largest = action_scale(platform, options)
     scale.acceleration, scale.jerk = vec9(*largest), vec9(*largest / options.rise_time)
     scale.velocity = vec9(*velocity_scale(platform))
     return scale
 
 
-def action_scale(platforms: Sequence[Platform], options: ActionOptions, device: Any) -> Any:
+def _actions(platforms: Sequence[Platform], options: ActionOptions, device: Any) -> Any:
     """The kernel's form of what an action stands for."""
     scale: Any = ActionScale()
     scale.mode, scale.free = MODES[options.mode], vec9(*free_axes(options.frozen))
-    axes = [axis_scale(platform, options) for platform in platforms]
+    axes = [_axis_scale(platform, options) for platform in platforms]
     scale.axes = wp.array(axes, dtype=AxisScale, device=device)
     scale.cab_frame = int(options.frame == "cab")
     return scale
@@ -109,7 +109,7 @@ def rules_of(
 ) -> Any:
     """What is the same for a whole batch, as the kernels read it."""
     rules: Any = Rules()
-    rules.action = action_scale(platforms, options.action, device)
+    rules.action = _actions(platforms, options.action, device)
     rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
     rules.places = places_of(layout, options.observation, dt, options.randomisation)
     if options.observation.machine:

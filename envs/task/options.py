@@ -75,6 +75,8 @@ class ActionOptions:
             reach, as fast as ``authority`` lets. "residual": an acceleration added to that of the base
             policy. "gains": the parameters of the base policy.
         authority: Largest acceleration, as a share of what the machine can do on the axis alone.
+        largest: What that is a share of instead, m/s^2 and rad/s^2 in the order of ``AXES``: then an action
+            asks for the same of every machine, which gives as much as it can.
         rise_time: Time in which full jerk takes an acceleration from zero to its largest value, s.
         frozen: Axes that do not move, by name.
         repeat: Time steps for which an action is held; rewards are averaged over them.
@@ -83,6 +85,7 @@ class ActionOptions:
 
     mode: Mode = "acceleration"
     authority: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    largest: Annotated[tuple[Positive, ...], Field(min_length=9, max_length=9)] | None = None
     rise_time: Positive = 0.2
     frozen: tuple[str, ...] = ()
     repeat: PositiveCount = 1

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..platform.machines import Platform
 from ..platform.parameters import neutral_jacobian
 from ..platform.state import AXES
+from .options import ActionOptions
 
 Floats = NDArray[np.float64]
 
@@ -19,6 +20,13 @@ def acceleration_scale(platform: Platform) -> Floats:
     that unit motion of the axis takes at neutral. Axes of a missing subsystem have 0: they do not move.
     """
     return _axis_limits(platform, "acceleration")
+
+
+def action_scale(platform: Platform, options: ActionOptions) -> Floats:
+    """(9,) acceleration that an action of 1 stands for on a machine, m/s^2, rad/s^2; 0 for missing axes."""
+    own = acceleration_scale(platform)
+    largest = own if options.largest is None else np.where(own > 0.0, options.largest, 0.0)
+    return np.asarray(largest * options.authority)
 
 
 def velocity_scale(platform: Platform) -> Floats:

@@ -304,3 +304,16 @@ class TestWindow:
         assert len(shown) == 2
         env.close()
         env.close()
+
+
+def test_each_environment_shows_its_own_machine():
+    builds = {"machines": 2, "build": {"size": (0.4, 1.0), "without_carriage": 0.5}}
+    looks = {"render_mode": "rgb_array", "render_size": SIZE, "drives": [drive(samples=LENGTH)]}
+    envs = DrivingSimulatorVector(4, randomisation=builds, **looks)
+    envs.reset(seed=0)
+    frames, simulator = envs.render(), envs.batch.simulator
+    assert set(simulator.platform_of.tolist()) == {0, 1}
+    for i, which in enumerate(simulator.platform_of.tolist()):
+        alone = single(platform=simulator.platforms[which])
+        alone.reset(seed=i)
+        np.testing.assert_array_equal(frames[i], alone.render())

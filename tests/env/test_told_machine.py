@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.platform.builds import BuildRanges
 from motion_cueing.envs.platform.reach import axis_reach
@@ -28,8 +29,8 @@ BUILD = BuildRanges(
     shape=(0.9, 1.1),
     rates=(0.5, 1.5),
     limited_turntable=0.5,
-    without_carriage=0.4,
-    without_turntable=0.3,
+    without_carriage=0.6,
+    without_turntable=0.5,
 )
 N = 6
 
@@ -160,6 +161,22 @@ def test_the_scale_is_each_machines_own():
     for axis, usual in enumerate(batch.usual_scale):
         moving = [scale[axis] for scale in machines if scale[axis] > 0.0]
         assert usual == (np.median(moving) if moving else 0.0)
+
+
+def test_largest_is_the_same_on_every_machine_that_has_the_axis():
+    largest = tuple(float(k) for k in range(1, 10))
+    batch = begun(task(action={"largest": largest, "authority": 0.01}), list(range(N)))
+    has = (
+        np.array([acceleration_scale(batch.simulator.platforms[k]) for k in batch.simulator.platform_of])
+        > 0.0
+    )
+    assert not has.all()
+    np.testing.assert_allclose(batch.scale, np.where(has, 0.01 * np.array(largest), 0.0), rtol=1e-12)
+    batch.write(np.full((N, 9), 0.5))
+    batch.step()
+    np.testing.assert_allclose(batch.asked, 0.5 * batch.scale, rtol=1e-6)
+    with pytest.raises(ConfigurationError, match="largest"):
+        task(action={"largest": (1.0, 2.0)})
 
 
 def test_an_episode_can_be_given_its_machine():

@@ -19,7 +19,7 @@ from ...envs.errors import MotionCueingError
 from ...envs.settings import to_dict
 from ...envs.storage import write_bytes
 from ...envs.task.ability import abilities
-from ...envs.task.scaling import acceleration_scale
+from ...envs.task.scaling import action_scale
 from .agent import Agent
 from .network import Array, Network
 
@@ -128,7 +128,7 @@ def metadata(agent: Agent) -> dict[str, str]:
     action = {
         "mode": agent.task.action.mode,
         "range": [-1.0, 1.0],
-        "scale": (acceleration_scale(agent.platform) * agent.task.action.authority).tolist(),
+        "scale": action_scale(agent.platform, agent.task.action).tolist(),
         "scale_unit": "m/s^2 and rad/s^2, of an acceleration of 1 on each axis",
         "repeat": agent.task.action.repeat,
     }
