@@ -143,13 +143,8 @@ class TaskBatch:
         self._batch = Batch(n, task, drives=cues, base=getattr(policy, "base_policy", None))
         self.simulator = self._batch.simulator
         everywhere = np.ones(n, dtype=bool)
-        self._batch.begin(everywhere, np.arange(n, dtype=np.int32))
-        self.simulator.place(
-            everywhere,
-            machine_of=machine_of,
-            sample=np.zeros(n, dtype=np.int32),
-            start=np.tile(start_of(policy), (n, 1)),
-        )
+        self._batch.begin(everywhere, np.arange(n, dtype=np.int32), machine_of)
+        self.simulator.reset(start_of(policy))
         self._batch.observe(everywhere)
         self._ask = _Asked(policy, n, self._batch.action_size)
 

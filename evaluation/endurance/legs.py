@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ...envs.platform.machines import Hexapod
 
 Floats = NDArray[np.float64]
+Vector = list[Floats]
+"""Three components."""
 
 
 class Legs(NamedTuple):
@@ -45,17 +47,19 @@ def legs_of(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> Legs:
 def _legs(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> tuple[Floats, Floats, Floats]:
     """Lengths, rates, and the determinant of the Jacobian."""
     upper, lower = np.array(hexapod.upper_joints), np.array(hexapod.lower_joints)
-    # Places first, poses last: sums over places are then sums of long rows.
-    angles, turning = pose[:, 3:].T, pose_rate[:, 3:].T
-    arm = np.einsum("ijn,kj->kin", _rotation(angles), upper)
-    leg = arm - lower[:, :, None] + (np.array(hexapod.neutral) + pose[:, :3]).T
-    speed = pose_rate[:, :3].T + _cross(_angular_velocity(angles, turning), arm)
-    length = np.sqrt((leg * leg).sum(axis=1))
-    direction = leg / length[:, None]
-    jacobian = np.concatenate([direction, _cross(arm, direction)], axis=1)
+    # Vectors of three arrays (6, n): their sums and products are those of long rows.
+    angles = np.ascontiguousarray(pose[:, 3:].T)
+    origin = (np.array(hexapod.neutral) + pose[:, :3]).T
+    arm = [upper @ row for row in _rotation(angles)]
+    leg = [arm[k] + origin[k] - lower[:, k, None] for k in range(3)]
+    turning = _cross(_angular_velocity(angles, pose_rate[:, 3:].T), arm)
+    length = np.sqrt(leg[0] ** 2 + leg[1] ** 2 + leg[2] ** 2)
+    direction = [component / length for component in leg]
+    rate = sum(direction[k] * (turning[k] + pose_rate[:, k]) for k in range(3))
+    jacobian = np.array([*direction, *_cross(arm, direction)])
     with np.errstate(invalid="ignore"):
-        determinant: Floats = np.linalg.det(np.moveaxis(jacobian, -1, 0))
-    return length.T, (direction * speed).sum(axis=1).T, determinant
+        determinant: Floats = np.linalg.det(jacobian.transpose(2, 1, 0))
+    return length.T, np.asarray(rate).T, determinant
 
 
 def _rotation(angles: Floats) -> Floats:
@@ -70,14 +74,13 @@ def _rotation(angles: Floats) -> Floats:
     )
 
 
-def _angular_velocity(angles: Floats, rates: Floats) -> Floats:
-    """(3, n) in inertial axes: roll turns about x, pitch about Rx y, yaw about Rx Ry z."""
+def _angular_velocity(angles: Floats, rates: Floats) -> Vector:
+    """In inertial axes: roll turns about x, pitch about Rx y, yaw about Rx Ry z."""
     (sp, st, _), (cp, ct, _) = np.sin(angles), np.cos(angles)
     roll, pitch, yaw = rates
-    return np.array([roll + st * yaw, cp * pitch - sp * ct * yaw, sp * pitch + cp * ct * yaw])
+    return [roll + st * yaw, cp * pitch - sp * ct * yaw, sp * pitch + cp * ct * yaw]
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    """Vector product along the last axis but one."""
-    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -2, 0), np.moveaxis(b, -2, 0)
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-2)
+def _cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
