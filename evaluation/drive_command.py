@@ -17,12 +17,10 @@ from .loop.client import Client, cues_at
 from .loop.endpoint import Endpoint, address_of, is_loopback
 from .loop.formats import make_format
 from .loop.pacing import undisturbed
-from .loop.report import SCHEMA, LoopReport, lines_of, timing_table
+from .loop.report import SCHEMA, LoopReport, tell
 from .loop.trouble import Trouble
-from .saved import save_json
 from .selection import find_car, find_maneuvers, find_platform
 from .serve_command import DEFAULT_PORT
-from .text_table import print_table, table_console
 from .words import words_of
 
 
@@ -121,10 +119,5 @@ def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
         timings={name: histogram.summary() for name, histogram in client.timings.items()},
         faults=tuple(client.faults),
     )
-    console = table_console()
-    for line in lines_of(report, "set-points"):
-        console.print(line, highlight=False, markup=False)
-    print_table(console, timing_table(report))
-    if command.report is not None:
-        save_json(report, command.report)
+    tell(report, "set-points", command.report)
     return 0 if client.counts["received"] and not client.counts["outside_limits"] else 1

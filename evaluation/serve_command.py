@@ -24,12 +24,10 @@ from .loop.formats import make_format
 from .loop.inbox import Inbox
 from .loop.machine import LiveMachine, make_machine
 from .loop.pacing import undisturbed
-from .loop.report import SCHEMA, LoopReport, lines_of, timing_table
+from .loop.report import SCHEMA, LoopReport, tell
 from .loop.server import Server
 from .loop.watchdog import Patience, State
-from .saved import save_json
 from .selection import find_platform
-from .text_table import print_table, table_console
 from .words import words_of
 
 DEFAULT_PORT: Final = 47100
@@ -171,12 +169,7 @@ def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
 def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: Endpoint) -> None:
     """Write the log and the report, and say what happened."""
     report = _report(command, served.controller, server, endpoint)
-    console = table_console()
-    for line in lines_of(report, "steps of 10 ms"):
-        console.print(line, highlight=False, markup=False)
-    print_table(console, timing_table(report))
-    if command.report is not None:
-        save_json(report, command.report)
+    tell(report, "steps of 10 ms", command.report)
     log = served.controller.log
     if command.log is not None and len(log) >= 2:
         log.trajectory(served.platform, served.machine.start, _VESTIBULAR, served.policy).save(command.log)

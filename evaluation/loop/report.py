@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import field
+from pathlib import Path
 from typing import Final
 
 from ...envs.settings import configuration
-from ..text_table import NOTHING, TextTable
+from ..saved import save_json
+from ..text_table import NOTHING, TextTable, print_table, table_console
 from .histogram import QUANTILES, TimingSummary
 
 SCHEMA: Final = 1
@@ -77,6 +79,22 @@ def lines_of(report: LoopReport, counted_in: str) -> list[str]:
         f"packets: {counted or 'none'}",
     ]
     return [*lines, *([f"{counted_in}: {states}"] if states else []), *report.faults]
+
+
+def tell(report: LoopReport, counted_in: str, file: Path | None) -> None:
+    """Print a report, and write it where a file is named.
+
+    Args:
+        report: The report.
+        counted_in: What its ``states`` count.
+        file: JSON.
+    """
+    console = table_console()
+    for line in lines_of(report, counted_in):
+        console.print(line, highlight=False, markup=False)
+    print_table(console, timing_table(report))
+    if file is not None:
+        save_json(report, file)
 
 
 def _microseconds(seconds: float | None) -> str:

@@ -12,6 +12,11 @@ from motion_cueing.train.agent import Agent, agent_names, get_agent
 
 WASHOUTS = ("classical", "classical-tuned")
 """The better one by hand, and the better one on the roads that agents are trained on."""
+TILTS_MORE = {
+    "learned": ({"braking", "acceleration", "slalom", "stop-and-go"}, {"acceleration", "step-steer"}),
+}
+"""Where an agent misses the bar, as docs/agents.md says: drives with a larger tilt rate than the tuned
+washout's, and with a large one for longer."""
 BEST = "learned-preview"
 """Better on every single maneuver, too."""
 
@@ -64,12 +69,9 @@ def test_it_tilts_no_faster_than_the_tuned_washout(agent, measured, washouts):
     tuned = {name: pair[WASHOUTS.index("classical-tuned")] for name, pair in washouts.items()}
     shares = [(ours.tilt_rate_share, tuned[name].tilt_rate_share) for name, ours in measured.items()]
     assert np.mean(shares, axis=0)[0] < 0.6 * np.mean(shares, axis=0)[1]
-    if agent.name == "learned":
-        # On single drives it tilts faster than the washout, see docs/agents.md.
-        return
-    for name, ours in measured.items():
-        assert ours.tilt_rate_peak <= tuned[name].tilt_rate_peak, name
-        assert ours.tilt_rate_share <= tuned[name].tilt_rate_share, name
+    faster = {n for n, ours in measured.items() if ours.tilt_rate_peak > tuned[n].tilt_rate_peak}
+    longer = {n for n, ours in measured.items() if ours.tilt_rate_share > tuned[n].tilt_rate_share}
+    assert (faster, longer) == TILTS_MORE.get(agent.name, (set(), set()))
 
 
 def test_no_limit_of_the_machine_is_exceeded(driven):
