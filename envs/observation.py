@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .cues import GRAVITY
 from .platform.state import Machine, Motion
 from .precision import real, vec3, vec9
-from .state import State
+from .state import Cues, State
 
 
 @dataclass(frozen=True)
@@ -98,20 +98,27 @@ def share_of_limit(value: real, lower: real, upper: real) -> real:
 
 @wp.func
 def write_observation(
-    m: Machine, s: State, p: Motion, acceleration: vec9, out: wp.array2d(dtype=real), i: int
+    m: Machine,
+    s: State,
+    p: Motion,
+    acceleration: vec9,
+    cues: Cues,
+    out: wp.array2d(dtype=real),
+    i: int,
 ) -> int:
     """One environment's observation, the rows in the order of :data:`ROWS`; returns its size.
 
-    ``p`` are the machine's set-points and ``acceleration`` its acceleration, in the frame to be seen in.
+    ``p`` are the machine's set-points and ``acceleration`` its acceleration, in the frame to be seen in;
+    ``cues`` are those of the cab.
     """
     gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
     one = real(1.0)
     wanted = s.wanted.force + gravity
-    felt = s.felt.force + gravity
+    felt = cues.force + gravity
     k = put(out, i, 0, wanted, 3, real(wp.static(SCALES["wanted_force"])))
     k = put(out, i, k, s.wanted.rate, 3, one)
     k = put(out, i, k, felt, 3, real(wp.static(SCALES["felt_force"])))
-    k = put(out, i, k, s.felt.rate, 3, one)
+    k = put(out, i, k, cues.rate, 3, one)
     k = put(out, i, k, p.position, 2, real(wp.static(SCALES["carriage"])))
     k = put(out, i, k, p.rate, 2, real(wp.static(SCALES["carriage_rate"])))
     k = put(out, i, k, p.displacement, 3, one)
@@ -138,7 +145,7 @@ def observe_kernel(
     """Observation of every environment."""
     i = wp.tid()
     s = state[i]
-    write_observation(machines[machine_of[i]], s, s.setpoint, s.acceleration, out, i)
+    write_observation(machines[machine_of[i]], s, s.setpoint, s.acceleration, s.felt, out, i)
 
 
 observe_forward = wp.kernel(observe_kernel, enable_backward=False, module="unique")

@@ -26,6 +26,7 @@ class State:
     setpoint: Motion  # limited commands
     motion: Motion  # the true machine: the set-point after dead time and lag
     acceleration: vec9  # of the true machine over the last step, in the order of AXES
+    setpoint_acceleration: vec9  # of the set-points, likewise
     limits: wp.uint64  # limits met in the last step, see platform.state.Step
     wanted: Cues
     felt: Cues

@@ -99,6 +99,7 @@ def next_state(
     after.limits = commanded.limits
     after.motion = motion
     after.acceleration = acceleration
+    after.setpoint_acceleration = mean_acceleration(state.setpoint, commanded.motion, dt)
     after.wanted = wanted_cues(m, drives, drive, after.sample)
     after.felt = felt_cues(m, motion, acceleration)
     after.vestibular_wanted = advance_vestibular(

@@ -63,6 +63,8 @@ class _Behind(Wrapped):
 
     errors: Mapping[str, slice] = MappingProxyType({})
     """Where the observation has the difference of cues wanted and felt, by name."""
+    in_cab: float = 1.0
+    """Share of the noise that the cab's cues get: 0 where a model tells them, not sensors."""
 
     def __init__(self, policy: Policy | TaskPolicy, noise: SensorNoise) -> None:
         super().__init__(policy)
@@ -92,6 +94,7 @@ class _Behind(Wrapped):
         shape = (*seen.shape[:-1], 3)
         for (wanted, felt, error), size in zip(_KINDS, (self._noise.force, self._noise.rate), strict=True):
             in_car, in_cab = self._draw.normal(scale=size, size=(2, *shape))
+            in_cab *= self.in_cab
             seen[..., SLICES[wanted]] += in_car / SCALES[wanted]
             seen[..., SLICES[felt]] += in_cab / SCALES[felt]
             if error in self.errors:
@@ -105,6 +108,7 @@ class _TaskBehind(_Behind):
     def __init__(self, policy: TaskPolicy, noise: SensorNoise) -> None:
         super().__init__(policy, noise)
         self.task = policy.task
+        self.in_cab = float(policy.task.observation.felt == "machine")
         self.base_policy = getattr(policy, "base_policy", None)
         layout = getattr(policy, "layout", None)
         self.errors = {} if layout is None else {name: layout.slices[name] for name in _ERRORS}

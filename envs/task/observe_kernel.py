@@ -10,7 +10,8 @@ from ..cues import GRAVITY
 from ..observation import SCALES, SLICES, write_observation
 from ..platform.state import Machine, Motion
 from ..precision import real, vec3, vec9
-from ..state import Drives, State
+from ..state import Cues, Drives, State
+from ..step import felt_cues
 from .ability_kernel import put_abilities, put_travel_used
 from .entries import put_entry, put_vector
 from .episode import Episode
@@ -47,6 +48,7 @@ class Places:
     preview_samples: int
     preview_stride: int  # time steps between samples
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
+    modelled: int  # whether the cab's cues are those of the set-points
     force_noise: real  # m/s^2
     rate_noise: real  # rad/s
     abilities: wp.array2d(dtype=wp.float32)  # what each machine can do, the constant rows
@@ -63,6 +65,7 @@ def places_of(layout: Layout, seen: ObservationOptions, dt: float, noise: Random
     places.preview_samples = seen.preview
     places.preview_stride = max(1, round(seen.preview_spacing / dt))
     places.cab_frame = int(seen.frame == "cab")
+    places.modelled = int(seen.felt == "model")
     places.force_noise, places.rate_noise = noise.force_noise, noise.rate_noise
     return places
 
@@ -109,10 +112,15 @@ def put_fixed(
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """Write the fixed rows, the cab's cues as its sensors tell them, and the car's minus them."""
+    """Write the fixed rows, the cab's cues as sensors or the model tell them, and the car's minus them."""
     # A generator of its own for each sample: what is seen does not depend on how often it is looked at.
     random = wp.rand_init(e.noise, sample)
-    noisy = p.force_noise + p.rate_noise > real(0.0)
+    noisy = p.force_noise + p.rate_noise > real(0.0) and p.modelled == 0
+    force_gain = real(1.0)
+    rate_gain = real(1.0)
+    if p.modelled == 0:
+        force_gain = e.force_gain
+        rate_gain = e.rate_gain
     for k in range(FELT_FORCE):
         put_entry(out, i, k, fixed[i, k], bounds)
     for k in range(3):
@@ -121,8 +129,8 @@ def put_fixed(
         if noisy:
             force_noise = p.force_noise / FORCE * real(wp.randn(random))
             rate_noise = p.rate_noise * real(wp.randn(random))
-        force = fixed[i, FELT_FORCE + k] * e.force_gain + force_noise
-        rate = fixed[i, FELT_RATE + k] * e.rate_gain + rate_noise
+        force = fixed[i, FELT_FORCE + k] * force_gain + force_noise
+        rate = fixed[i, FELT_RATE + k] * rate_gain + rate_noise
         put_entry(out, i, FELT_FORCE + k, force, bounds)
         put_entry(out, i, FELT_RATE + k, rate, bounds)
         put_entry(out, i, p.force_error + k, fixed[i, WANTED_FORCE + k] - force, bounds)
@@ -203,6 +211,22 @@ def seen_axes(p: Places, m: Motion, v: vec9) -> vec9:
 
 
 @wp.func
+def seen_acceleration(p: Places, s: State) -> vec9:
+    """The acceleration that the observation tells: of the true motion, or of the set-points."""
+    if p.modelled != 0:
+        return s.setpoint_acceleration
+    return s.acceleration
+
+
+@wp.func
+def seen_cues(p: Places, m: Machine, s: State) -> Cues:
+    """The cab's cues that the observation tells, likewise."""
+    if p.modelled != 0:
+        return felt_cues(m, s.setpoint, s.setpoint_acceleration)
+    return s.felt
+
+
+@wp.func
 def write_frame(
     p: Places,
     drives: Drives,
@@ -225,7 +249,8 @@ def write_frame(
     ``which`` is the number of the machine.
     """
     seen = seen_motion(p, s.setpoint)
-    write_observation(machine, s, seen, seen_axes(p, s.setpoint, s.acceleration), fixed, i)
+    acceleration = seen_axes(p, s.setpoint, seen_acceleration(p, s))
+    write_observation(machine, s, seen, acceleration, seen_cues(p, machine, s), fixed, i)
     put_fixed(p, e, s.sample, fixed, bounds, out, i)
     for k in range(now.shape[1]):
         put_entry(out, i, p.last_action + k, real(now[i, k]), bounds)

@@ -23,6 +23,7 @@ PositiveCount = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
 Frame = Literal["machine", "cab"]
+Felt = Literal["machine", "model"]
 
 
 def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
@@ -54,6 +55,9 @@ class ObservationOptions:
             is ahead of the driver looks the same wherever the turntable stands.
         machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
             A policy that is told this runs on any machine.
+        felt: Which cues the cab's rows tell: "machine": those of the true motion, by its sensors; or "model":
+            those of the set-points, which a controller works out by itself. A policy that sees the second
+            has no loop through the actuators, so their lag and dead time cannot make it swing.
     """
 
     preview: Count = 0
@@ -64,6 +68,7 @@ class ObservationOptions:
     memory: tuple[Positive, ...] = ()
     frame: Frame = "machine"
     machine: bool = False
+    felt: Felt = "machine"
 
 
 @configuration

@@ -286,3 +286,16 @@ def test_entries_beyond_their_bound_are_clipped():
         observation, *_ = env.step(np.zeros(9))
     assert np.array_equal(observation[:3], [10.0, 10.0, 10.0])
     assert observation in env.observation_space
+
+
+def test_the_models_cues_are_those_of_a_machine_that_follows_at_once():
+    noisy = RandomisationOptions(**vars(LAG) | {"sensor_gain": 0.2, "force_noise": 0.1, "rate_noise": 0.01})
+    told, modelled = moved(observation=ObservationOptions(felt="model", frame="cab"), randomisation=noisy)
+    swift, sensed = moved(observation=ObservationOptions(frame="cab"))
+    late, true = moved(observation=ObservationOptions(frame="cab"), randomisation=LAG)
+    np.testing.assert_allclose(modelled, sensed, rtol=0.0, atol=2e-5)
+    for name in ("felt_force", "felt_rate", "acceleration", "force_error", "rate_error"):
+        assert not close(row(late, true, name), row(swift, sensed, name)), name
+    # What is felt, and counts, is the true motion's all the same.
+    felt = told.batch.simulator.state[0]["felt"]["force"]
+    assert not close(felt, row(told, modelled, "felt_force") - GRAVITY)

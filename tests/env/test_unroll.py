@@ -18,10 +18,10 @@ SEEN = {"memory": (0.5, 4.0), "preview": 2, "frame": "cab", "perceived": True, "
 WEIGHTS = {"perceived_error": 0.3, "false_cues": 0.1, "tilt_rate": 0.5, "stroke": 1.0, "action_rate": 0.5}
 
 
-def batch(mode: str = "acceleration", **options) -> Batch:
+def batch(mode: str = "acceleration", felt: str = "machine", **options) -> Batch:
     """Three episodes under way, the machines somewhere in their travel."""
     task = TaskOptions(
-        observation=SEEN,
+        observation={**SEEN, "felt": felt},
         action={"mode": mode, "frame": "cab", "repeat": 3, "authority": 0.3},
         reward={"weights": WEIGHTS, "stroke_margin": 0.2},
         episode={"duration": 2.0, "random_start": True, "platform_offset": 0.3},
@@ -109,6 +109,12 @@ def gradient_that_agrees(unroll: TaskUnroll, policy: LinearPolicy) -> np.ndarray
 @pytest.mark.parametrize("mode", ["acceleration", "jerk", "velocity"])
 def test_gradients_through_policy_and_machine_agree_with_finite_differences(mode):
     unroll = TaskUnroll(batch(mode), ACTIONS)
+    assert gradient_that_agrees(unroll, LinearPolicy(unroll.batch.layout.size)).any()
+
+
+def test_gradients_where_actuators_lag_and_the_model_tells_what_is_felt():
+    slow = {"natural_frequency": (30.0, 90.0), "dead_time": (0.0, 0.03)}
+    unroll = TaskUnroll(batch(felt="model", randomisation=slow), ACTIONS)
     assert gradient_that_agrees(unroll, LinearPolicy(unroll.batch.layout.size)).any()
 
 

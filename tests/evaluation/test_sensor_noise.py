@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from motion_cueing.envs.observation import OBSERVATION_SIZE, read
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.evaluation.rollout import rollout
 from motion_cueing.evaluation.sensor_noise import SensorNoise, with_noise
+from motion_cueing.train.agent import Agent
 
 from .studies import PAPER, bend
 
@@ -153,3 +156,16 @@ def test_a_policy_that_is_told_the_drive_has_noisy_sensors_too():
     seer = with_noise(Told(), SensorNoise(force=1.0)).for_drive(bend())
     looked(seer, np.zeros((1, OBSERVATION_SIZE)))
     assert seer._policy.seen[0].any()
+
+
+def test_what_a_model_tells_an_agent_has_no_noise_but_the_cars():
+    agent = make_policy("learned-preview", PAPER)
+    task = replace(agent.task, observation=replace(agent.task.observation, felt="model"))
+    modelled = Agent("modelled", task, agent.network, agent.record)
+    rows = with_noise(modelled, SensorNoise())._noisy(np.zeros((50, agent.layout.size)))
+    slices = agent.layout.slices
+    for kind in ("force", "rate"):
+        assert not rows[:, slices[f"felt_{kind}"]].any()
+        wanted = rows[:, slices[f"wanted_{kind}"]]
+        assert wanted.any()
+        np.testing.assert_allclose(rows[:, slices[f"{kind}_error"]], wanted, atol=1e-7)
