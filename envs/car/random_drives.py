@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from .paths import STEP, Path
 from .roads import KINDS, Road
 from .simulation import Plan, simulate
 from .speed_planning import Style, along_path, speed_limit
+from .unevenness import Unevenness
 from .vehicles import Car
 
 Floats = NDArray[np.float64]
@@ -28,6 +30,8 @@ SHORTEST: Final = 0.1
 
 LONGEST: Final = 86_400.0
 """Of a drive, s: a day, some gigabyte of cues."""
+
+_UNEVENNESS_STREAM: Final = 1
 
 
 @configuration
@@ -42,6 +46,8 @@ class RandomDrives:
         hilly: Of drives over steep hills and crests.
         strip: Of drives with standing starts and full braking, far along a straight.
         cones: Of weaves, sudden bends and lane changes close to what tires hold.
+        roughness: Range of the road's roughness G(n0), 1e-6 m^3, of which the square root is drawn. ISO 8608:
+            16 is a very good road, 64 a good, 256 an average one; 0 is smooth.
         cars: Cars to draw from, by name.
     """
 
@@ -52,11 +58,14 @@ class RandomDrives:
     hilly: NonNegative = 0.0
     strip: NonNegative = 0.0
     cones: NonNegative = 0.0
+    roughness: tuple[NonNegative, NonNegative] = (0.0, 0.0)
     cars: Annotated[tuple[str, ...], Field(min_length=1)] = ("sedan",)
 
     def __post_init__(self) -> None:
         if sum(getattr(self, kind) for kind in KINDS) <= 0.0:
             raise ValueError(f"one of {', '.join(KINDS)} must be positive")
+        if self.roughness[0] > self.roughness[1]:
+            raise ValueError(f"roughness must be a range from low to high, found {list(self.roughness)}")
         for name in self.cars:
             if name not in car_names():
                 raise ValueError(str(UnknownNameError("car", name, car_names())))
@@ -82,7 +91,15 @@ class RandomDrives:
         kind = drawn_kind if kind is None else kind
         if kind not in KINDS:
             raise UnknownNameError("kind of road", kind, KINDS)
-        return _plan(f"{kind}-{seed}", car or get_car(drawn_car), kind, rng, duration)
+        plan = _plan(f"{kind}-{seed}", car or get_car(drawn_car), kind, rng, duration)
+        return plan if self.roughness[1] == 0.0 else self._uneven(plan, seed)
+
+    def _uneven(self, plan: Plan, seed: int) -> Plan:
+        """The plan on an uneven road, all else being as it was."""
+        rng = np.random.default_rng((seed, _UNEVENNESS_STREAM))
+        roughness = 1e-6 * float(rng.uniform(*np.sqrt(self.roughness))) ** 2
+        length = float(plan.schedule.distance[-1]) + plan.car.length
+        return replace(plan, unevenness=Unevenness.drawn(roughness, length, rng))
 
 
 def random_drive(

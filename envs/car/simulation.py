@@ -18,6 +18,7 @@ from .drive_kernel import COLUMNS, SUBSTEPS, Row, Task, drive_all, vec4
 from .driver import Driver, DriverParameters
 from .paths import Path, clothoids
 from .schedules import DT, Schedule
+from .unevenness import Unevenness, shaking
 from .vehicle_state import CarParameters
 from .vehicles import Car
 
@@ -25,6 +26,8 @@ Floats = NDArray[np.float64]
 
 ROBOT: Final = Driver(hand_lag=0.02)
 """A steering robot: keeps the speed as a driver does, and turns the wheel as told, within 20 ms."""
+
+_SPEED: Final = COLUMNS.index("speed_m_s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,7 @@ class Plan:
         steering: (n,) steering-wheel angles, rad, instead of following the path; one a sample of the
             schedule.
         driver: Who drives; the default driver, or a :data:`ROBOT` where ``steering`` is given.
+        unevenness: Of the road; None for a smooth one.
         source: For reports.
     """
 
@@ -48,6 +52,7 @@ class Plan:
     schedule: Schedule
     steering: Floats | None = None
     driver: Driver | None = None
+    unevenness: Unevenness | None = None
     source: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -80,7 +85,7 @@ def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
         One trace a plan, sampled at 100 Hz, at the origin of F_A, with the channels
         :data:`~.drive_kernel.COLUMNS`: accelerations are those of the point of the roll axis under the c.g.,
         in the road's frame; ``path_offset_m`` is the distance to the right of the path; throttle and brake
-        are shares.
+        are shares. On an uneven road all three cues have what it adds to those of the smooth one.
 
     Raises:
         DataError: the car left the range of the model (a plan no car can follow).
@@ -145,12 +150,18 @@ def _trace(plan: Plan, rows: Floats) -> CueTrace:
         raise DataError(
             f"{plan.name}: {plan.car.name} left the range of the vehicle model; ask for less speed or bend"
         )
+    force, rate, rate_derivative = rows[:, 0:3], rows[:, 3:6], rows[:, 6:9]
+    if plan.unevenness is not None:
+        distance = np.cumsum(DT * rows[:, 9 + _SPEED])
+        added = shaking(plan.car, plan.unevenness, distance, DT)
+        force, rate = force + added.force, rate + added.rate
+        rate_derivative = rate_derivative + added.rate_derivative
     return CueTrace(
         name=plan.name,
         time=np.asarray(DT * np.arange(len(rows)), dtype=np.float64),
-        specific_force=rows[:, 0:3],
-        angular_velocity=rows[:, 3:6],
-        angular_acceleration=rows[:, 6:9],
+        specific_force=force,
+        angular_velocity=rate,
+        angular_acceleration=rate_derivative,
         channels={name: rows[:, 9 + k] for k, name in enumerate(COLUMNS)},
         source=plan.source or f"{plan.car.name}, vehicle model",
     )
