@@ -104,8 +104,9 @@ class GradientLearner:
             self.batch.seed(everywhere, seeds)
         self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
         self._ahead = Ahead(self.given.value, self.actor, self._length, self.batch.time_step)
-        # Actions to the end of each episode, and what each drive usually costs.
-        self._left, self._usual = np.zeros(n, dtype=np.int64), np.full(len(self.batch.drives), math.nan)
+        # Actions to the end of each episode, and what each drive usually costs on each machine.
+        self._left = np.zeros(n, dtype=np.int64)
+        self._usual = np.full((len(self.batch.drives), len(self.batch.simulator.platforms)), math.nan)
         self._rounds, self._skipped, self._left_out = 0, 0, 0
         self._sums: dict[str, float] = {}
         self._logged = 0
@@ -161,10 +162,10 @@ class GradientLearner:
         self._left -= self._length
 
     def _weights(self, costs: Floats) -> Floats:
-        """(n,) of the windows: less where a drive is wild."""
-        drives = self.batch.simulator.drive_of
-        known = np.where(np.isnan(self._usual[drives]), costs, self._usual[drives])
-        self._usual[drives] = (1.0 - _USUAL) * known + _USUAL * costs
+        """(n,) of the windows: less where a drive is wild, on the machine it is driven on."""
+        there = self.batch.simulator.drive_of, self.batch.simulator.platform_of
+        known = np.where(np.isnan(self._usual[there]), costs, self._usual[there])
+        self._usual[there] = (1.0 - _USUAL) * known + _USUAL * costs
         return np.asarray(1.0 / (self.given.offset + np.maximum(known, costs)))
 
     def _note(self, costs: Floats, told: dict[str, float]) -> None:

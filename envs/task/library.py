@@ -23,6 +23,12 @@ _FRICTION_STREAM: Final = 1
 _MACHINE_STREAM: Final = 2
 _BUILD_STREAM: Final = 3
 
+_DRAWS: Final = 8
+"""How often a random drive is drawn anew, at most, whose car comes off its path."""
+
+_OFTEN: Final = 0.1
+"""Share of random drives that may be drawn anew: where more come off, what is asked for is wrong."""
+
 
 def slippery(car: Car, factor: float) -> Car:
     """The same car with its tires' friction times a factor."""
@@ -35,13 +41,30 @@ def _frictions(episode: EpisodeOptions, randomisation: RandomisationOptions, cou
 
 
 def _random_drives(episode: EpisodeOptions, randomisation: RandomisationOptions) -> list[CueTrace]:
-    source, seeds = episode.random, drive_seeds(episode.library, episode.library_seed)
-    frictions = _frictions(episode, randomisation, len(seeds))
-    plans = []
-    for seed, factor in zip(seeds, frictions, strict=True):
-        car = source.plan(seed, episode.drive_duration).car
-        plans.append(source.plan(seed, episode.drive_duration, car=slippery(car, factor)))
-    return _driven(plans)
+    """The library; drives whose car comes off its path are drawn anew, if they are few."""
+    count = episode.library
+    seeds = drive_seeds(_DRAWS * count, episode.library_seed)
+    frictions = _frictions(episode, randomisation, count)
+    drives: dict[int, CueTrace] = {}
+    rows = list(range(count))
+    for draw in range(_DRAWS):
+        plans = [_slippery_plan(episode, seeds[draw * count + row], frictions[row]) for row in rows]
+        traces = simulate(plans)
+        drives.update(zip(rows, traces, strict=True))
+        off = [
+            k for k, (plan, trace) in enumerate(zip(plans, traces, strict=True)) if _comes_off(plan, trace)
+        ]
+        if not off:
+            break
+        if draw == _DRAWS - 1 or (draw == 0 and len(off) > max(1.0, _OFTEN * count)):
+            raise _off_its_path(plans[off[0]], traces[off[0]])
+        rows = [rows[k] for k in off]
+    return [drives[row] for row in range(count)]
+
+
+def _slippery_plan(episode: EpisodeOptions, seed: int, friction: float) -> Plan:
+    car = episode.random.plan(seed, episode.drive_duration).car
+    return episode.random.plan(seed, episode.drive_duration, car=slippery(car, friction))
 
 
 def _named_drives(episode: EpisodeOptions, randomisation: RandomisationOptions) -> list[CueTrace]:
@@ -65,15 +88,27 @@ def _driven(plans: list[Plan]) -> list[CueTrace]:
     """
     traces = simulate(plans)
     for plan, trace in zip(plans, traces, strict=True):
-        offset = float(np.abs(trace.channels["path_offset_m"]).max())
-        if plan.steering is None and offset > LARGEST_OFFSET:
-            car = plan.car
-            raise ConfigurationError(
-                f"{car.name} with tire friction {car.tires.friction:.2f} came {offset:.1f} m off the path of "
-                f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomisation.friction, or leave the "
-                "drive or the car out of episode"
-            )
+        if _comes_off(plan, trace):
+            raise _off_its_path(plan, trace)
     return traces
+
+
+def _offset(trace: CueTrace) -> float:
+    """Largest distance from the path, m."""
+    return float(np.abs(trace.channels["path_offset_m"]).max())
+
+
+def _comes_off(plan: Plan, trace: CueTrace) -> bool:
+    return plan.steering is None and _offset(trace) > LARGEST_OFFSET
+
+
+def _off_its_path(plan: Plan, trace: CueTrace) -> ConfigurationError:
+    car = plan.car
+    return ConfigurationError(
+        f"{car.name} with tire friction {car.tires.friction:.2f} came {_offset(trace):.1f} m off the path of "
+        f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomisation.friction, or leave the "
+        "drive or the car out of episode"
+    )
 
 
 @lru_cache(maxsize=8)
@@ -81,7 +116,8 @@ def library_of(episode: EpisodeOptions, randomisation: RandomisationOptions) -> 
     """The drives that options ask for; the same options give the same drives.
 
     Raises:
-        ConfigurationError: a car came off its path (a friction too low for the drive).
+        ConfigurationError: a car came off its path (a friction too low for the drive): of a maneuver, of more
+            than a tenth of the random drives, or of one drawn eight times.
         DataError: a car left the range of its model.
     """
     make = _named_drives if episode.drives else _random_drives
