@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import Field
 
@@ -18,7 +18,8 @@ NOMINAL: Final = "nominal"
 SLOWER: Final = "slower"
 """Name of the condition with machines whose actuators have a lag and a dead time."""
 
-_EVERY_KIND: Final = RandomDrives(**dict.fromkeys(KINDS, 1.0), cars=tuple(car_names()))
+_EVENLY: Final[dict[str, Any]] = dict.fromkeys(KINDS, 1.0)
+_EVERY_KIND: Final = RandomDrives(**_EVENLY, cars=tuple(car_names()))
 
 
 @configuration
