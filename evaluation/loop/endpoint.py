@@ -96,11 +96,14 @@ def address_of(text: str, port: int) -> Address:
         port: Where none is said.
 
     Raises:
-        ConfigurationError: there is no such host, or the port is no number from 0 to 65535.
+        ConfigurationError: there is no host, or none of this name, or the port is no number from 0 to 65535.
     """
     host, colon, said = text.partition(":")
     if colon and not (said.isascii() and said.isdigit()):
         raise ConfigurationError(f"{text}: a port is a number, as in 127.0.0.1:{port}")
+    if not host:
+        # The system would take it for 0.0.0.0, every address of this machine.
+        raise ConfigurationError(f"{text!r}: name a host, as in 127.0.0.1:{port}")
     number = int(said) if colon else port
     if number > 65535:
         raise ConfigurationError(f"{text}: a port is at most 65535")
