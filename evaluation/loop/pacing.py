@@ -6,7 +6,7 @@ import gc
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from ...envs.errors import ConfigurationError
 
@@ -59,21 +59,29 @@ def undisturbed(cpu: int | None = None, priority: int | None = None) -> Iterator
     Raises:
         ConfigurationError: the system refuses.
     """
-    try:
-        if cpu is not None:
-            os.sched_setaffinity(0, {cpu})
-        if priority is not None:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (AttributeError, OSError, OverflowError) as error:
-        raise ConfigurationError(
-            f"the system refuses --cpu {cpu} or --priority {priority} ({error}); leave it out, or run as one "
-            "who may"
-        ) from None
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    try:
+    with ExitStack() as after:
+        try:
+            _prefer(cpu, priority, after)
+        except (AttributeError, OSError, OverflowError) as error:
+            raise ConfigurationError(
+                f"the system refuses --cpu {cpu} or --priority {priority} ({error}); leave it out, or run as "
+                "one who may"
+            ) from None
+        gc.collect()
+        gc.freeze()
+        after.callback(gc.unfreeze)
+        gc.disable()
+        after.callback(gc.enable)
         yield
-    finally:
-        gc.enable()
-        gc.unfreeze()
+
+
+def _prefer(cpu: int | None, priority: int | None, after: ExitStack) -> None:
+    """Take core and priority; ``after`` gives them back: logs are written as any other program writes."""
+    if cpu is not None:
+        cores = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {cpu})
+        after.callback(os.sched_setaffinity, 0, cores)
+    if priority is not None:
+        policy, level = os.sched_getscheduler(0), os.sched_getparam(0)
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        after.callback(os.sched_setscheduler, 0, policy, level)

@@ -145,4 +145,24 @@ def test_the_collector_rests_and_works_again():
     with pytest.raises(ConfigurationError, match="refuses --cpu 100000"), undisturbed(cpu=100000):
         pass
     assert gc.isenabled()
-    assert os.sched_getaffinity(0)
+
+
+def test_core_and_priority_are_given_back(monkeypatch):
+    """Also the core, where the priority that comes after it is refused."""
+    cores, levels = os.sched_getaffinity(0), []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *given: levels.append(given))
+    with undisturbed(cpu=min(cores), priority=7):
+        assert os.sched_getaffinity(0) == {min(cores)}
+    assert os.sched_getaffinity(0) == cores
+    assert [(policy, one.sched_priority) for _, policy, one in levels] == [
+        (os.SCHED_FIFO, 7),
+        (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority),
+    ]
+
+    def refuse(*given):
+        raise PermissionError("not you")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    with pytest.raises(ConfigurationError, match="not you"), undisturbed(cpu=min(cores), priority=7):
+        pass
+    assert os.sched_getaffinity(0) == cores
