@@ -22,6 +22,8 @@ from .watchdog import State
 _NS: Final = 1e-9
 _MOST_FAULTS: Final = 5
 """Wrong set-points that are told; all are counted."""
+_LATEST: Final = 1e10
+"""No clock shows more, s: that are 300 years."""
 
 
 class Client:
@@ -95,6 +97,9 @@ class Client:
         try:
             setpoint = self._form.unpack_setpoint(data)
         except DataError:
+            self.counts["malformed"] += 1
+            return
+        if not all(abs(stamp) <= _LATEST for stamp in (setpoint.echo_time, setpoint.received, setpoint.sent)):
             self.counts["malformed"] += 1
             return
         self.counts["received"] += 1

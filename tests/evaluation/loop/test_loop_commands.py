@@ -176,6 +176,10 @@ def test_addresses():
     assert address_of("127.0.0.1:6", 5) == ("127.0.0.1", 6)
     with pytest.raises(ConfigurationError):
         address_of("127.0.0.1:", 5)
+    # The system's own answer is 0.0.0.0: an unset variable in a script would let the network in.
+    for text in ("", ":6"):
+        with pytest.raises(ConfigurationError, match="name a host"):
+            address_of(text, 5)
     with pytest.raises(UnknownNameError):
         get_platform("papier")
 
@@ -250,6 +254,11 @@ def test_the_client_counts_what_is_wrong():
         "received": 5, "malformed": 1, "foreign": 1, "missing": 2, "disordered": 1, "outside_limits": 1,
     }  # fmt: skip
     assert client.faults == ["set-point 5 exceeds the position limit of carriage_x"]
+    # Times of a controller that is not ours may be anything.
+    for wrong in ({"echo_time": np.nan}, {"sent": np.inf}, {"received": -1e300}):
+        there.send(FLOATS.pack_setpoint(still(7)._replace(**wrong)), here.address)
+    client.listen(0.0)
+    assert (client.counts["malformed"], client.counts["received"]) == (4, 5)
     here.close()
     there.close()
 
