@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ..envs.car import drive_seeds
 from ..envs.errors import ConfigurationError
 from ..envs.settings import Positive, configuration, from_dict
 from ..envs.task.batch import Batch
@@ -69,7 +70,8 @@ class LinearLearner:
         _check(config)
         torch.set_num_threads(config.threads)
         torch.manual_seed(config.seed)
-        self._total, self._seed, self._each = config.steps, config.seed, config.n_envs
+        self._total, self._each = config.steps, config.n_envs
+        self._seeds = drive_seeds(self._each, config.seed)
         self.batch = Batch(config.n_envs * self.given.population, config.task)
         self._everywhere = np.ones(self.batch.n, dtype=bool)
         self._length = round(float(config.task.episode.duration or 0.0) / self.batch.time_step)
@@ -105,8 +107,7 @@ class LinearLearner:
         """What each candidate costs, in the same episodes of every generation."""
         batch, arrays = self.batch, self.batch.arrays
         matrices = np.array([self._gains(point) for point in points])
-        seeds = [self._seed + i % self._each for i in range(batch.n)]
-        batch.seed(self._everywhere, seeds)
+        batch.seed(self._everywhere, self._seeds * len(points))
         batch.begin(self._everywhere)
         batch.observe(self._everywhere)
         costs = np.zeros(batch.n)
