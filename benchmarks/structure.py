@@ -38,7 +38,13 @@ BASE: dict[str, Any] = {
             "random_start": True,
         },
     },
-    "hyperparameters": {"learning_rate": 6.0e-4, "window": 10.0, "outlier": 3.0, "offset": 1.0},
+    "hyperparameters": {
+        "learning_rate": 6.0e-4,
+        "window": 10.0,
+        "outlier": 3.0,
+        "offset": 1.0,
+        "standardise": True,
+    },
     "validation": {"every": EVERY, "drives": 24},
     "checkpoints": {"every": STEPS // 2},
 }
@@ -51,6 +57,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "unscaled": {"hyperparameters": {"standardise": False}},
     "preview": {"task": {"observation": {"preview": 10}}},
     "from-washout": {},
+    "from-washout-unscaled": {"hyperparameters": {"standardise": False}},
     "whole-episode": {"hyperparameters": {"window": None}},
     "window-2s": {"hyperparameters": {"window": 2.0}},
     "window-2s-value": {"hyperparameters": {"window": 2.0, "value": {}}},
@@ -61,7 +68,7 @@ WASHOUT: dict[str, Any] = merge(
     {key: BASE[key] for key in ("n_envs", "task")},
     {"steps": 10_800_000, "hyperparameters": {"population": 15}, "task": {"episode": {"duration": 30.0}}},
 )
-"""The linear washout that `from-washout` begins with."""
+"""The linear washout that the variants `from-washout` begin with."""
 
 
 def trained(folder: Path, algo: str, fields: dict[str, Any]) -> Training:
@@ -74,7 +81,7 @@ def trained(folder: Path, algo: str, fields: dict[str, Any]) -> Training:
 def fields_of(variant: str, seed: int, out: Path) -> dict[str, Any]:
     """The configuration of a variant's seed; a washout it begins with is trained first."""
     fields = merge(merge(BASE, VARIANTS[variant]), {"seed": seed})
-    if variant == "from-washout":
+    if variant.startswith("from-washout"):
         washout = trained(out / f"washout-{seed}", "linear", {**WASHOUT, "seed": seed})
         fields["initial"] = str(washout.run.best_agent)
     return fields

@@ -51,7 +51,9 @@ class GradientHyperparameters:
         outlier: An environment's own gradient is shortened to so many times the median one's.
         offset: The cost of a drive counts relative to this plus what the drive usually costs: every drive by
             its relative gain, a wild one as much as a gentle one.
-        standardise: Whether the policy sees observations relative to mean and deviation under the first one.
+        standardise: Whether the policy sees observations relative to mean and deviation under the first one,
+            and acts relative to what that does. None: if the training goes on from an agent; the spring that
+            it begins with otherwise moves too little to be a measure.
         window: How far gradients are led, s; None: to the end of the episode.
         value: Of what comes after a window; None: nothing does.
     """
@@ -62,7 +64,7 @@ class GradientHyperparameters:
     max_grad_norm: Positive = 1.0
     outlier: Positive = 2.0
     offset: Positive = 0.2
-    standardise: bool = True
+    standardise: bool | None = None
     window: Positive | None = None
     value: ValueOptions | None = None
 
@@ -99,7 +101,7 @@ class GradientLearner:
         size, actions = self.batch.layout.size, self.batch.action_size
         self.actor = Actor(size, actions, self.given.net_arch, self.given.activation_fn)
         begin(self.actor, self.batch, config)
-        if self.given.standardise:
+        if self.given.standardise or (self.given.standardise is None and config.initial is not None):
             standardise(self.actor, self.batch, self._episode)
             self.batch.seed(everywhere, seeds)
         self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
