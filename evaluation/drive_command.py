@@ -12,12 +12,11 @@ from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.targets import check_file
 from ..train.interrupt import Interrupt
-from ..train.provenance import hardware, now, versions
 from .loop.client import Client, cues_at
 from .loop.endpoint import Endpoint, address_of, is_loopback
 from .loop.formats import make_format
 from .loop.pacing import undisturbed
-from .loop.report import SCHEMA, LoopReport, tell
+from .loop.report import report_of, tell
 from .loop.trouble import Trouble
 from .selection import find_car, find_maneuvers, find_platform
 from .serve_command import DEFAULT_PORT
@@ -104,20 +103,13 @@ def _trace(command: DriveCommand) -> CueTrace:
 
 
 def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
-    report = LoopReport(
-        schema=SCHEMA,
-        command=" ".join(words_of("drive", command)),
-        created=now(),
-        versions=versions(),
-        hardware=hardware("cpu"),
-        duration=client.duration,
+    report = report_of(
+        words_of("drive", command),
+        client,
         periods=client.periods,
-        overrun=client.pace.overrun,
-        skipped=client.pace.skipped,
         packets={**client.counts, "unsent": endpoint.unsent},
-        states={state.name.lower(): count for state, count in client.states.items()},
-        timings={name: histogram.summary() for name, histogram in client.timings.items()},
-        faults=tuple(client.faults),
+        states=client.states,
+        faults=client.faults,
     )
     tell(report, "set-points", command.report)
     return 0 if client.counts["received"] and not client.counts["outside_limits"] else 1

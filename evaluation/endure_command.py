@@ -7,9 +7,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from pathlib import Path
-from shlex import join
 from typing import TYPE_CHECKING, Annotated, Final
 
 from rich.console import Console
@@ -18,7 +16,7 @@ from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.errors import ConfigurationError
 from ..envs.targets import check_folder, check_own_json
-from .provenance import versions
+from .provenance import head_of
 from .selection import find_platform, find_policies
 from .text_table import print_table, save_markdown, table_console
 from .words import how_many, words_of
@@ -149,14 +147,11 @@ def _progress(seconds: float) -> Iterator[Tell]:
 
 def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceResults:
     from ..envs.simulator import TIME_STEP
-    from .endurance.results import SCHEMA, EnduranceResults, summarised
+    from .endurance.results import EnduranceResults, summarised
 
     driven = {name: one for name, one in found.policies.items() if one.drives}
     return EnduranceResults(
-        schema=SCHEMA,
-        command=join(words_of("endure", command)),
-        created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        versions=versions(),
+        **head_of(EnduranceResults, words_of("endure", command)),
         platform=asked.platform.name,
         endurance=asked.endurance,
         finished=found.finished,

@@ -14,6 +14,7 @@ from typing import Any, Final
 from pydantic import JsonValue
 
 from .results import Provenance
+from .saved import Headed
 
 DISTRIBUTION: Final = "motion-cueing-gym"
 """Name of this package for installers."""
@@ -35,6 +36,26 @@ def versions() -> dict[str, str]:
     return found | {name: _version(name) for name in _LIBRARIES}
 
 
+def created() -> str:
+    """Now: UTC, ISO 8601."""
+    return datetime.now(timezone.utc).isoformat(timespec="seconds")
+
+
+def head_of(kind: type[Headed], words: Sequence[str]) -> dict[str, Any]:
+    """The fields of :class:`~.saved.Headed`.
+
+    Args:
+        kind: Of the results.
+        words: The command line, program first.
+    """
+    return {
+        "schema": kind.version,
+        "command": shlex.join(words),
+        "created": created(),
+        "versions": versions(),
+    }
+
+
 def provenance(
     arguments: Sequence[str],
     platform: tuple[str, Mapping[str, Any]],
@@ -52,7 +73,7 @@ def provenance(
     configuration = {"platform": platform[1], "car": car[1], "policies": policies}
     return Provenance(
         command=shlex.join(arguments),
-        created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        created=created(),
         versions=versions(),
         platform=platform[0],
         car=car[0],

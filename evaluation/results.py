@@ -12,7 +12,7 @@ from pydantic import JsonValue
 from ..envs.settings import configuration, to_dict
 from .criteria import Criteria
 from .metrics import Metrics
-from .saved import load_json, save_json
+from .saved import Saved
 from .share import Share, shares
 from .spreadsheet import save_rows
 from .verdict import Standing, Verdict, judge, judge_suite
@@ -58,8 +58,8 @@ class Provenance:
 
 
 @configuration
-class Results:
-    """Everything an evaluation found.
+class Results(Saved):
+    """Everything an evaluation found: ``results.json``.
 
     Args:
         schema: :data:`SCHEMA`.
@@ -73,6 +73,9 @@ class Results:
         left_out: Policies that were asked for but cannot be driven here, and why.
         notes: What policies counted in a drive, by maneuver and policy, where they did.
     """
+
+    what = "results"
+    version = SCHEMA
 
     schema: int
     provenance: Provenance
@@ -126,20 +129,6 @@ class Results:
         ranked = [standing.policy for standing in self.standings]
         found = {policy for drives in self.maneuvers.values() for policy in drives}
         return ranked + sorted(found - set(ranked))
-
-    def save_json(self, path: str | Path) -> None:
-        """Write ``results.json``, whole or not at all."""
-        save_json(self, path)
-
-    @classmethod
-    def load_json(cls, path: str | Path) -> Results:
-        """Read ``results.json``.
-
-        Raises:
-            DataError: the file is missing, broken, or of another version.
-            ConfigurationError: a field is missing, unknown or wrong.
-        """
-        return load_json(cls, path, "results", SCHEMA)
 
     def save_csv(self, path: str | Path) -> None:
         """Write ``results.csv``: one row a drive, one column a metric, nothing where undefined."""

@@ -4,13 +4,58 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
+
+from typing_extensions import Self
 
 from ..envs.errors import DataError
-from ..envs.settings import from_dict, to_dict
+from ..envs.settings import configuration, from_dict, to_dict
 from ..envs.storage import write_text
 
 T = TypeVar("T")
+
+
+class Saved:
+    """A configuration that is kept in a file, and has a field ``schema``.
+
+    Attributes:
+        what: It is called in messages.
+        version: Of its file; a reader refuses others.
+    """
+
+    what: ClassVar[str]
+    version: ClassVar[int]
+
+    def save_json(self, path: str | Path) -> None:
+        """Write it, whole or not at all."""
+        save_json(self, path)
+
+    @classmethod
+    def load_json(cls, path: str | Path) -> Self:
+        """Read what :meth:`save_json` wrote.
+
+        Raises:
+            DataError: the file is missing, broken, or of another version.
+            ConfigurationError: a field is missing, unknown or wrong.
+        """
+        return load_json(cls, path, cls.what, cls.version)
+
+
+@configuration
+class Headed(Saved):
+    """Results that begin with what made them; see ``provenance.head_of``.
+
+    Args:
+        schema: Version of the file.
+        command: The command line.
+        created: UTC, ISO 8601.
+        versions: Of this package, Python and the libraries that matter.
+    """
+
+    schema: int
+    command: str
+    created: str
+    versions: dict[str, str]
 
 
 def save_json(results: Any, path: str | Path) -> None:

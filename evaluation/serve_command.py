@@ -17,14 +17,13 @@ from ..envs.errors import ConfigurationError
 from ..envs.platform import Platform
 from ..envs.targets import check_file
 from ..train.interrupt import Interrupt
-from ..train.provenance import hardware, now, versions
 from .loop.controller import Controller, ControllerOptions
 from .loop.endpoint import Endpoint, address_of, is_loopback
 from .loop.formats import make_format
 from .loop.inbox import Inbox
 from .loop.machine import LiveMachine, make_machine
 from .loop.pacing import undisturbed
-from .loop.report import SCHEMA, LoopReport, tell
+from .loop.report import LoopReport, report_of, tell
 from .loop.server import Server
 from .loop.watchdog import Patience, State
 from .selection import find_platform
@@ -177,18 +176,11 @@ def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: En
 
 def _report(command: ServeCommand, controller: Controller, server: Server, endpoint: Endpoint) -> LoopReport:
     inbox, states = controller.inbox, controller.log.states
-    return LoopReport(
-        schema=SCHEMA,
-        command=" ".join(words_of("serve", command)),
-        created=now(),
-        versions=versions(),
-        hardware=hardware("cpu"),
-        duration=server.duration,
+    return report_of(
+        words_of("serve", command),
+        server,
         periods=controller.periods,
-        overrun=server.pace.overrun,
-        skipped=server.pace.skipped,
         packets={**inbox.counts, "lost": inbox.lost, "unsent": endpoint.unsent},
-        states={state.name.lower(): int((states == state).sum()) for state in State},
-        timings={name: histogram.summary() for name, histogram in server.timings.items()},
-        faults=tuple(controller.faults),
+        states={state: int((states == state).sum()) for state in State},
+        faults=controller.faults,
     )

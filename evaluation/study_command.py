@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from datetime import datetime, timezone
 from pathlib import Path
-from shlex import join
 
 from ..envs.storage import write_bytes
 from ..envs.targets import check_folder, check_own_json
 from .criteria import Criteria
-from .provenance import versions
+from .provenance import head_of
 from .study import Condition, StudyOutcome, run_study
-from .study_results import SCHEMA, StudyResults, common_maneuvers, summarise
+from .study_results import StudyResults, common_maneuvers, summarise
 from .study_store import check_kept
 from .study_tables import matrix_table, print_study, share_tables
 from .suite_progress import suite_progress
@@ -83,10 +81,7 @@ def results_of(
     """The results of an outcome, with what made them."""
     criteria = Criteria()
     return StudyResults(
-        schema=SCHEMA,
-        command=join(words),
-        created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        versions=versions(),
+        **head_of(StudyResults, words),
         conditions={condition.name: condition.description for condition in conditions},
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),

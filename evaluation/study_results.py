@@ -9,7 +9,7 @@ from typing import Any, Final
 from ..envs.settings import configuration, to_dict
 from .criteria import Criteria
 from .metrics import Metrics
-from .saved import load_json, save_json
+from .saved import Headed
 from .share import shares
 from .spreadsheet import save_rows
 
@@ -62,14 +62,10 @@ class Summary:
 
 
 @configuration
-class StudyResults:
-    """A study.
+class StudyResults(Headed):
+    """A study: ``study.json``.
 
     Args:
-        schema: :data:`SCHEMA`.
-        command: The command line.
-        created: UTC, ISO 8601.
-        versions: Of this package, Python and the libraries that matter.
         conditions: One line about each condition, by name; the first is what others are compared with.
         policies: Names.
         maneuvers: In the means.
@@ -81,10 +77,9 @@ class StudyResults:
         criteria: The thresholds the metrics were measured with.
     """
 
-    schema: int
-    command: str
-    created: str
-    versions: dict[str, str]
+    what = "a study"
+    version = SCHEMA
+
     conditions: dict[str, str]
     policies: tuple[str, ...]
     maneuvers: tuple[str, ...]
@@ -111,20 +106,6 @@ class StudyResults:
             f"{policy}{'' if len(under) == len(self.conditions) else ', ' + ', '.join(under)}: {reason}"
             for (policy, reason), under in reasons.items()
         ]
-
-    def save_json(self, path: str | Path) -> None:
-        """Write ``study.json``, whole or not at all."""
-        save_json(self, path)
-
-    @classmethod
-    def load_json(cls, path: str | Path) -> StudyResults:
-        """Read ``study.json``.
-
-        Raises:
-            DataError: the file is missing, broken, or of another version.
-            ConfigurationError: a field is missing, unknown or wrong.
-        """
-        return load_json(cls, path, "a study", SCHEMA)
 
     def save_csv(self, path: Path) -> None:
         """Write ``study.csv``: a row a condition and policy, with the reason where it was left out."""

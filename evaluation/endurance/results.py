@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...envs.settings import configuration
-from ..saved import load_json, save_json
+from ..saved import Headed
 from ..spreadsheet import save_rows
 from .options import NOMINAL, SLOWER, Endurance
 
@@ -153,14 +153,10 @@ class EnduranceSummary:
 
 
 @configuration
-class EnduranceResults:
-    """All policies.
+class EnduranceResults(Headed):
+    """All policies: ``endurance.json``.
 
     Args:
-        schema: :data:`SCHEMA`.
-        command: The command line.
-        created: UTC, ISO 8601.
-        versions: Of this package, Python and the libraries that matter.
         platform: Name of the machine.
         endurance: What policies were put through.
         finished: Whether all drives that were asked for are done.
@@ -168,19 +164,14 @@ class EnduranceResults:
         policies: By name.
     """
 
-    schema: int
-    command: str
-    created: str
-    versions: dict[str, str]
+    what = "the results of an endurance"
+    version = SCHEMA
+
     platform: str
     endurance: Endurance
     finished: bool
     summaries: dict[str, EnduranceSummary]
     policies: dict[str, PolicyEndurance]
-
-    def save_json(self, path: str | Path) -> None:
-        """Write ``endurance.json``, whole or not at all."""
-        save_json(self, path)
 
     def save_csv(self, path: str | Path) -> None:
         """Write one line a policy, drive and condition."""
@@ -194,16 +185,6 @@ class EnduranceResults:
                 }
                 for condition, endured in drive.conditions.items():
                     yield {"policy": policy, **about, "condition": condition, **_flat(endured)}
-
-    @classmethod
-    def load_json(cls, path: str | Path) -> EnduranceResults:
-        """Read what :meth:`save_json` wrote.
-
-        Raises:
-            DataError: the file is missing, broken, or of another version.
-            ConfigurationError: a field is missing, unknown or wrong.
-        """
-        return load_json(cls, path, "the results of an endurance", SCHEMA)
 
 
 def summarised(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSummary:

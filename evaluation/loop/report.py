@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 from ...envs.settings import configuration
-from ..saved import save_json
+from ...train.provenance import hardware
+from ..provenance import head_of
+from ..saved import Headed
 from ..text_table import NOTHING, TextTable, print_table, table_console
-from .histogram import QUANTILES, TimingSummary
+from .histogram import QUANTILES, Histogram, TimingSummary
+from .pacing import Pace
+from .watchdog import State
 
 SCHEMA: Final = 1
 """Version of the file; a reader refuses others."""
 
 
 @configuration
-class LoopReport:
+class LoopReport(Headed):
     """A run of the controller, or of its client.
 
     Args:
-        schema: :data:`SCHEMA`.
-        command: The command line.
-        created: UTC, ISO 8601.
-        versions: Of this package, Python and the libraries that matter.
         hardware: What it ran on.
         duration: From the first period to the last, s.
         periods: That were made.
@@ -35,10 +36,9 @@ class LoopReport:
         faults: What the policy raised; or what was wrong with the set-points.
     """
 
-    schema: int
-    command: str
-    created: str
-    versions: dict[str, str]
+    what = "the report of a loop"
+    version = SCHEMA
+
     hardware: str
     duration: float
     periods: int
@@ -48,6 +48,46 @@ class LoopReport:
     timings: dict[str, TimingSummary]
     states: dict[str, int] = field(default_factory=dict)
     faults: tuple[str, ...] = ()
+
+
+class Timed(Protocol):
+    """Who ran at a pace: a server or a client."""
+
+    timings: dict[str, Histogram]
+    pace: Pace
+    duration: float
+
+
+def report_of(
+    words: Sequence[str],
+    who: Timed,
+    periods: int,
+    packets: dict[str, int],
+    states: Mapping[State, int],
+    faults: Sequence[str],
+) -> LoopReport:
+    """The report of a run.
+
+    Args:
+        words: The command line.
+        who: Ran.
+        periods: That were made.
+        packets: By what became of them.
+        states: By state of the controller.
+        faults: In words.
+    """
+    return LoopReport(
+        **head_of(LoopReport, words),
+        hardware=hardware("cpu"),
+        duration=who.duration,
+        periods=periods,
+        overrun=who.pace.overrun,
+        skipped=who.pace.skipped,
+        packets=packets,
+        states={state.name.lower(): count for state, count in states.items()},
+        timings={name: histogram.summary() for name, histogram in who.timings.items()},
+        faults=tuple(faults),
+    )
 
 
 def timing_table(report: LoopReport) -> TextTable:
@@ -94,7 +134,7 @@ def tell(report: LoopReport, counted_in: str, file: Path | None) -> None:
         console.print(line, highlight=False, markup=False)
     print_table(console, timing_table(report))
     if file is not None:
-        save_json(report, file)
+        report.save_json(file)
 
 
 def _microseconds(seconds: float | None) -> str:

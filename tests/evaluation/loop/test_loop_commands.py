@@ -26,7 +26,6 @@ from motion_cueing.evaluation.loop.packets import Cues, SetPoint
 from motion_cueing.evaluation.loop.report import SCHEMA, LoopReport
 from motion_cueing.evaluation.loop.trouble import Trouble
 from motion_cueing.evaluation.loop.watchdog import State
-from motion_cueing.evaluation.saved import load_json
 from motion_cueing.evaluation.serve_command import ServeCommand
 from motion_cueing.evaluation.suite import run_suite
 
@@ -70,12 +69,12 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, tmp_path,
     button.asked = True
     server.join()
     assert status == 0
-    found = load_json(LoopReport, told, "a report", SCHEMA)
+    found = LoopReport.load_json(told)
     assert found.packets["used"] > 0
     assert found.states["running"] > 0
     assert found.timings["period"].count == found.periods
     assert found.command.startswith("motion-cueing serve")
-    answers = load_json(LoopReport, driven, "a report", SCHEMA).packets
+    answers = LoopReport.load_json(driven).packets
     assert answers["received"] > 0
     assert answers["malformed"] == answers["outside_limits"] == 0
     assert f"UDP 127.0.0.1:{port}" in capsys.readouterr().out
@@ -97,7 +96,7 @@ def test_who_stops_it_gets_its_report(number, tmp_path):
         server.send_signal(number)
         assert "periods in" in server.stdout.read()
     assert server.returncode == 0
-    assert load_json(LoopReport, tmp_path / "told.json", "a report", SCHEMA).states["running"] == 0
+    assert LoopReport.load_json(tmp_path / "told.json").states["running"] == 0
 
 
 def test_a_replay_needs_its_own_machine_and_cues(tmp_path, capsys):
