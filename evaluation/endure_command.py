@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -67,7 +66,7 @@ class EndureCommand:
     out: Annotated[Path, arg(metavar="DIR")] = Path("endurance")
     """Folder for everything that is written; made if missing."""
     fresh: Annotated[bool, FlagCreatePairsOff] = False
-    """Drive everything again."""
+    """Drive again what these policies have driven."""
 
 
 def run(command: EndureCommand) -> int:
@@ -77,12 +76,9 @@ def run(command: EndureCommand) -> int:
         MotionCueingError: an argument is wrong.
     """
     from .endurance.run import Run
-    from .endurance.store import FOLDER
 
     asked = _asked(command)
-    if command.fresh:
-        shutil.rmtree(command.out / FOLDER, ignore_errors=True)
-    driving = Run(asked)
+    driving = Run(asked, command.fresh)
     with _progress(driving.seconds) as tell:
         found = driving.drive(tell)
     results = _results(command, asked, found)
@@ -98,8 +94,8 @@ def _asked(command: EndureCommand) -> Asked:
     from .endurance.run import Asked
 
     for name, value in (("hours", command.hours), ("duration", command.duration), ("envs", command.envs)):
-        if not value > 0:
-            raise ConfigurationError(f"--{name} must be positive, found {value:g}")
+        if not 0 < value < math.inf:
+            raise ConfigurationError(f"--{name} must be positive and finite, found {value:g}")
     check_folder("--out", command.out)
     check_own_json("--out", command.out / "endurance.json", frozenset({"schema", "endurance"}))
     platform = find_platform(command.platform)

@@ -96,7 +96,7 @@ class PolicyEndurance:
     Args:
         key: Of all that makes drives what they are; see ``store.endurance_key``.
         drives: Those that are done.
-        extremes: By condition.
+        extremes: By condition; of all drives that are kept, also where fewer are asked for.
     """
 
     key: str

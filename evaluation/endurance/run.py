@@ -73,19 +73,23 @@ class Run:
 
     Args:
         asked: What is to be driven.
+        fresh: Forget what these policies have driven.
 
     Raises:
         MotionCueingError: there is no such policy, or it was not made for the machine.
     """
 
-    def __init__(self, asked: Asked) -> None:
+    def __init__(self, asked: Asked, fresh: bool = False) -> None:
         self._asked, self._found = asked, Found()
-        self._policies: dict[str, AnyPolicy] = {}
+        # All of them first: a wrong name forgets nothing.
+        self._policies: dict[str, AnyPolicy] = {
+            label: make_policy(name, asked.platform) for label, name in asked.policies.items()
+        }
         self._stores: dict[str, EnduranceStore] = {}
         for label, name in asked.policies.items():
-            policy = make_policy(name, asked.platform)
-            key = endurance_key(asked.platform, asked.endurance, identity(name, policy))
-            self._policies[label], self._stores[label] = policy, EnduranceStore(asked.folder, label, key)
+            about = identity(name, self._policies[label])
+            key = endurance_key(asked.platform, asked.endurance, about)
+            self._stores[label] = EnduranceStore(asked.folder, label, key, fresh)
 
     @property
     def seconds(self) -> float:

@@ -28,14 +28,17 @@ class EnduranceStore:
         folder: Of the results.
         policy: Label of the policy.
         key: Of :func:`endurance_key`; drives of another key are not taken.
+        fresh: Remove what is kept.
 
     Raises:
         DataError: a file is damaged.
     """
 
-    def __init__(self, folder: Path, policy: str, key: str) -> None:
+    def __init__(self, folder: Path, policy: str, key: str, fresh: bool = False) -> None:
         tag = hashlib.sha256(policy.encode()).hexdigest()[:6]
         self._path = folder / FOLDER / f"{plain_name(policy)}-{tag}.json"
+        if fresh:
+            self._path.unlink(missing_ok=True)
         self.kept = self._load(key)
 
     def _load(self, key: str) -> PolicyEndurance:

@@ -133,6 +133,7 @@ def test_drives_in_one():
     [
         (["--policy", "classikal"], "classical"),
         (["--hours", "0"], "hours must be positive"),
+        (["--hours", "inf"], "hours must be positive and finite"),
         (["--envs", "-1"], "envs must be positive"),
         (["--lag", "60", "30"], "from low to high"),
         (["--dead-time", "0.1"], "--dead-time"),
@@ -153,7 +154,12 @@ def test_damaged_drives_and_foreign_results_are_refused(tmp_path, capsys):
     kept.write_text("{")
     assert main(argv) == 2
     assert f"{kept}: damaged" in capsys.readouterr().err
+    # A wrong policy forgets nothing, and only what these policies drove is driven again.
+    assert main([*argv, "--fresh", "--policy", "no-motion", "nobody.safetensors"]) == 2
+    assert kept.read_text() == "{"
+    (tmp_path / "drives" / "mine.txt").write_text("not of this command")
     assert main([*argv, "--fresh"]) == 0
+    assert (tmp_path / "drives" / "mine.txt").exists()
     (tmp_path / "endurance.json").write_text(json.dumps({"mine": 1}))
     assert main(argv) == 2
     assert "was not written by this command" in capsys.readouterr().err
