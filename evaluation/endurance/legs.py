@@ -32,14 +32,15 @@ class Legs(NamedTuple):
 
 
 def legs_of(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> Legs:
-    """Legs of poses.
+    """Legs of poses; of those that are not finite, not a number.
 
     Args:
         hexapod: With its joints.
         pose: (n, 6) displacement from neutral, m; roll, pitch, yaw, rad.
         pose_rate: (n, 6) their rates.
     """
-    length, rate, determinant = _legs(hexapod, pose, pose_rate)
+    with np.errstate(invalid="ignore"):
+        length, rate, determinant = _legs(hexapod, pose, pose_rate)
     neutral, _, at_neutral = _legs(hexapod, np.zeros((1, 6)), np.zeros((1, 6)))
     return Legs(length - neutral, rate, determinant / at_neutral)
 
@@ -57,8 +58,7 @@ def _legs(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> tuple[Floats, Fl
     direction = [component / length for component in leg]
     rate = sum(direction[k] * (turning[k] + pose_rate[:, k]) for k in range(3))
     jacobian = np.array([*direction, *_cross(arm, direction)])
-    with np.errstate(invalid="ignore"):
-        determinant: Floats = np.linalg.det(jacobian.transpose(2, 1, 0))
+    determinant: Floats = np.linalg.det(jacobian.transpose(2, 1, 0))
     return length.T, np.asarray(rate).T, determinant
 
 

@@ -47,7 +47,8 @@ class TrueLimits:
     def exceeded(self, motion: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
         """(steps, n) whether each of :data:`KINDS` is exceeded.
 
-        Keeps the largest ``use`` of a limit, which is 1, and the least ``clearance`` of singular poses.
+        Keeps the largest ``use`` of a limit, which is 1, and the least ``clearance`` of singular poses, both
+        where they are finite.
 
         Args:
             motion: (steps, n) rows of ``envs.platform.state.Motion``; they follow those of the last call.
@@ -65,14 +66,14 @@ class TrueLimits:
             "pose": (np.abs(position[..., LEGS] - told) <= TOLERANCE).all(axis=-1) & (clearance > 0.0),
             "number": np.isfinite(position).all(axis=-1) & np.isfinite(rate).all(axis=-1),
         }
-        self.clearance = min(self.clearance, float(np.min(clearance)))
+        self.clearance = float(np.min(clearance, initial=self.clearance, where=np.isfinite(clearance)))
         return {name: np.logical_not(flags) for name, flags in kept.items()}
 
     def _keeps(self, name: str, values: Floats, limit: Floats, scale: Floats) -> NDArray[np.bool_]:
         """(steps, n) whether all actuators keep a limit; what is not a number keeps none."""
         size = np.abs(values)
         share = np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0)
-        self.use[name] = max(self.use[name], float(np.max(share)))
+        self.use[name] = float(np.max(share, initial=self.use[name], where=np.isfinite(share)))
         return np.asarray((size <= limit + TOLERANCE * scale).all(axis=-1))
 
     def _actuators(self, motion: NDArray[Any]) -> tuple[Floats, Floats, Floats, Floats]:

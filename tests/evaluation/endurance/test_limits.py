@@ -115,6 +115,19 @@ def test_motion_that_is_not_a_number_keeps_no_limit():
     assert found["acceleration"] == [[1, 1], [2, 1]]
 
 
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+def test_extremes_are_those_of_what_is_finite(wrong):
+    """Nothing else can be written down; a motion that is no number hides no other."""
+    motion, limits = motions(3), TrueLimits(PAPER, 2, TIME_STEP)
+    for field in ("position", "rate"):
+        motion[field][1, 1, 0] = wrong
+    motion["beta"][1, 1, 1] = wrong
+    motion["position"][2, 0, 0] = 0.5 * PAPER.carriage.travel_x[1]
+    assert limits.exceeded(motion)["number"].sum() == 1
+    assert limits.use["position"] == pytest.approx(0.5)
+    assert np.isfinite([*limits.use.values(), limits.clearance]).all()
+
+
 def test_what_is_not_there_must_not_move():
     fixed = PAPER.without_carriage().without_turntable()
     motion = motions(3, fixed)
