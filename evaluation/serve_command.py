@@ -170,7 +170,9 @@ def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: En
     report = _report(command, served.controller, server, endpoint)
     tell(report, "steps of 10 ms", command.report)
     log = served.controller.log
-    if command.log is not None and len(log) >= 2:
+    if command.log is not None and len(log) < 2:
+        print(f"--log {command.log} is not written: it ended within the first steps", file=sys.stderr)
+    elif command.log is not None:
         log.trajectory(served.platform, served.machine.start, _VESTIBULAR, served.policy).save(command.log)
 
 

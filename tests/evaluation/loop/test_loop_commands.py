@@ -268,3 +268,11 @@ def test_a_report_is_json_of_its_version(tmp_path):
     values = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
     assert values["schema"] == SCHEMA
     assert values["command"].startswith("motion-cueing serve --policy no-motion")
+
+
+def test_a_log_of_nothing_is_not_written_and_that_is_told(tmp_path, capsys):
+    log = tmp_path / "log.npz"
+    words = ["serve", "--policy", "no-motion", "--port", "0", "--duration", "1e-9", "--log", str(log)]
+    assert main(words) == 0
+    assert f"{log} is not written" in capsys.readouterr().err
+    assert not log.exists()
