@@ -1,8 +1,8 @@
 """Analytic policy gradient: the reward's own gradient, through policy and machine.
 
 Every round drives a window in each environment with the policy, leads the gradient of the cost back through
-every time step, and takes a step of Adam. A window is a whole episode, or it is shorter and the next one goes
-on where it ended; then a learned value of its end can stand for what is still to come (the short-horizon
+every time step, and takes a step along it. A window is a whole episode, or it is shorter and the next one
+goes on where it ended; then a learned value of its end can stand for what is still to come (the short-horizon
 actor-critic, SHAC, of Xu et al. 2022). No action is ever sampled.
 """
 
@@ -27,9 +27,9 @@ from .actor import ACTIVATIONS, Actor
 from .agent import Network
 from .ahead import Ahead, ValueOptions
 from .config import TrainingConfig
+from .descent import Descent
 from .initial import begin
 from .learner import Boundary, State, restoring
-from .schedule import warm_cosine
 from .standard import standardise
 from .through_time import ThroughTime, tamed
 
@@ -45,6 +45,8 @@ class GradientHyperparameters:
 
     Args:
         learning_rate: Largest, of Adam; it rises linearly in the first tenth and falls as a cosine.
+        hidden_rate: Largest step of a hidden layer's matrix, in its spectral norm, by Muon; it rises and
+            falls likewise. None: hidden layers, too, by Adam.
         net_arch: Entries of each hidden layer.
         activation_fn: Of the hidden layers.
         max_grad_norm: Longer gradients are shortened to it.
@@ -59,6 +61,7 @@ class GradientHyperparameters:
     """
 
     learning_rate: Positive = 2e-3
+    hidden_rate: Positive | None = None
     net_arch: tuple[PositiveCount, ...] = (128, 128)
     activation_fn: Annotated[str, Field(pattern="|".join(ACTIVATIONS))] = "elu"
     max_grad_norm: Positive = 1.0
@@ -104,7 +107,8 @@ class GradientLearner:
         if self.given.standardise or (self.given.standardise is None and config.initial is not None):
             standardise(self.actor, self.batch, self._episode)
             self.batch.seed(everywhere, seeds)
-        self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
+        given = self.given
+        self._descent = Descent(self.actor, given.learning_rate, given.hidden_rate, given.max_grad_norm)
         self._ahead = Ahead(self.given.value, self.actor, self._length, self.batch.time_step)
         # Actions to the end of each episode, and what each drive usually costs on each machine.
         self._left = np.zeros(n, dtype=np.int64)
@@ -140,15 +144,13 @@ class GradientLearner:
         gradients = drive.lead_back(self._ahead.weights(weights), self._ahead.gradient(end, weights))
         gradients, left_out = tamed(gradients, self.given.outlier)
         self._left_out += left_out
-        self._optimizer.zero_grad()
+        self._descent.forget()
         torch.sum(self.actor(seen) * gradients).backward()  # type: ignore[no-untyped-call]
-        norm = float(torch.nn.utils.clip_grad_norm_(self.actor.parameters(), self.given.max_grad_norm))
-        for group in self._optimizer.param_groups:
-            group["lr"] = self.given.learning_rate * warm_cosine(self.steps / self._total)
+        norm = self._descent.clip()
         if not math.isfinite(norm) or norm == 0.0:
             self._skipped += 1
             return 0.0
-        self._optimizer.step()
+        self._descent.step(self.steps / self._total)
         return norm
 
     def _go_on(self) -> None:
@@ -182,9 +184,8 @@ class GradientLearner:
         """Means since the last call, and what was skipped since the beginning for not being finite."""
         means = {name: total / self._logged for name, total in self._sums.items()}
         self._sums, self._logged = {}, 0
-        rate = self._optimizer.param_groups[0]["lr"]
         skipped = {"train/skipped_rounds": self._skipped, "train/skipped_episodes": self._left_out}
-        return {**means, **skipped, "train/learning_rate": float(rate)}
+        return {**means, **skipped, "train/learning_rate": self._descent.learning_rate}
 
     def network(self) -> Network:
         """The policy as it is now."""
@@ -194,7 +195,7 @@ class GradientLearner:
         """Weights, optimizer, environments, counts."""
         return {
             "actor": self.actor.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
+            "descent": self._descent.state(),
             "batch": self.batch.snapshot(),
             "window": {"left": self._left.copy(), "usual": self._usual.copy(), **self._unroll.snapshot()},
             "ahead": self._ahead.state(),
@@ -206,7 +207,7 @@ class GradientLearner:
         """Go on from a state, bit for bit."""
         with restoring():
             self.actor.load_state_dict(state["actor"])
-            self._optimizer.load_state_dict(state["optimizer"])
+            self._descent.restore(state["descent"])
             self.batch.restore(state["batch"])
             self._unroll.restore(state["window"])
             self._left, self._usual = state["window"]["left"].copy(), state["window"]["usual"].copy()

@@ -28,7 +28,7 @@ SMALL = {
 }
 
 
-WINDOWS = {"window": 0.5, "value": {"lead": 2, "net_arch": [16], "batches": 2}}
+WINDOWS = {"window": 0.5, "value": {"lead": 2, "net_arch": [16], "batches": 2}, "hidden_rate": 0.05}
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def config(tmp_path_factory) -> TrainingConfig:
 
 @pytest.fixture(params=["episodes", "windows"])
 def either(request, config) -> TrainingConfig:
-    """With windows as long as an episode, and with shorter ones and a value."""
+    """With windows as long as an episode and Adam, and with shorter ones, a value, and Muon."""
     if request.param == "episodes":
         return config
     return replace(config, hyperparameters={**config.hyperparameters, **WINDOWS})
