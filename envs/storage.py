@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +28,12 @@ def replacing(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def copy_file(source: str | Path, target: str | Path) -> None:
+    """Copy a file in one piece."""
+    with Path(source).open("rb") as file, replacing(target, "wb") as copy:
+        shutil.copyfileobj(file, copy)
 
 
 def write_text(path: str | Path, text: str) -> None:

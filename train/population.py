@@ -20,7 +20,7 @@ import numpy as np
 
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.settings import load, save
-from ..envs.storage import write_text
+from ..envs.storage import copy_file, write_text
 from .config import TrainingConfig
 from .engine.job import Ending, Engine, Listener, run_jobs
 from .run import RunFolder, free_folder
@@ -197,8 +197,8 @@ class Population:
         ]
         best = min(range(len(latest)), key=lambda i: _finite(latest[i].best))
         final = min(range(len(latest)), key=lambda i: _finite(latest[i].rating))
-        shutil.copyfile(folders[best].best_agent, self.best_agent)
-        shutil.copyfile(folders[final].final_agent, self.path / "final.safetensors")
+        copy_file(folders[best].best_agent, self.best_agent)
+        copy_file(folders[final].final_agent, self.path / "final.safetensors")
 
     def _save(self) -> None:
         state = [[asdict(member) for member in members] for members in self.generations]

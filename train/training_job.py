@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import platform
-import shutil
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from ..envs.errors import DataError, MotionCueingError
-from ..envs.storage import replacing, write_text
+from ..envs.storage import copy_file, write_text
 from .checkpoint import checkpoints_in
 from .config import TrainingConfig
 from .engine.job import Report
@@ -81,5 +80,4 @@ def inherit(run: RunFolder, parent: RunFolder) -> None:
     (*_, last) = checkpoints_in(parent.checkpoints)
     for path in (parent.path / LOG, parent.best_agent, last):
         if path.exists():
-            with path.open("rb") as source, replacing(run.path / path.relative_to(parent.path), "wb") as copy:
-                shutil.copyfileobj(source, copy)
+            copy_file(path, run.path / path.relative_to(parent.path))
