@@ -42,16 +42,14 @@ def seeds(folder: Path, config: TrainingConfig, count: int) -> list[TrainingJob]
 
 
 @dataclass(frozen=True)
-class Mortal:
-    """A training whose process is killed when it is half done; once, or always.
+class Around:
+    """A job around a training.
 
     Args:
         training: The training.
-        always: Whether every process that takes it up is killed.
     """
 
     training: TrainingJob
-    always: bool = False
 
     @property
     def name(self) -> str:
@@ -60,6 +58,17 @@ class Mortal:
     @property
     def config(self) -> TrainingConfig:
         return self.training.config
+
+
+@dataclass(frozen=True)
+class Mortal(Around):
+    """A training whose process is killed when it is half done; once, or always.
+
+    Args:
+        always: Whether every process that takes it up is killed.
+    """
+
+    always: bool = False
 
     def run(self, report: Report) -> Any:
         seen = [path.stem for path in checkpoints_in(self.training.path / "checkpoints")]
@@ -86,22 +95,8 @@ class Failing:
 
 
 @dataclass(frozen=True)
-class Waiting:
-    """A training that waits, half done, to be stopped.
-
-    Args:
-        training: The training.
-    """
-
-    training: TrainingJob
-
-    @property
-    def name(self) -> str:
-        return self.training.name
-
-    @property
-    def config(self) -> TrainingConfig:
-        return self.training.config
+class Waiting(Around):
+    """A training that waits, half done, to be stopped."""
 
     def run(self, report: Report) -> Any:
         def held(status: Status) -> bool:

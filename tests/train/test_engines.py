@@ -185,6 +185,21 @@ def test_a_ray_that_does_not_start_is_told_and_leaves_nothing(monkeypatch):
     assert not any(Path(one["_temp_dir"]).exists() for one in given)
 
 
+def test_ctrl_c_while_ray_starts_leaves_nothing(monkeypatch):
+    given = []
+
+    def init(**arguments):
+        given.append(arguments)
+        raise KeyboardInterrupt
+
+    library = SimpleNamespace(init=init, shutdown=lambda: None, __spec__="any")
+    monkeypatch.setitem(sys.modules, "ray", library)
+    with pytest.raises(KeyboardInterrupt), RayEngine(3):
+        pass
+    assert len(given) == 1
+    assert not Path(given[0]["_temp_dir"]).exists()
+
+
 def test_a_cluster_is_joined_only_where_one_listens(monkeypatch):
     joined = []
     library = SimpleNamespace(
@@ -203,6 +218,10 @@ def test_a_cluster_is_joined_only_where_one_listens(monkeypatch):
         pass
     with pytest.raises(ConfigurationError, match="expected HOST:PORT"), RayEngine(3, "somewhere"):
         pass
+    # Names no host can have, which Python finds out before the system does.
+    for wrong in (f"{64 * 'a'}.b:1", "127.0.0.1:²"):
+        with pytest.raises(DataError, match="no Ray cluster answers"), RayEngine(3, wrong):
+            pass
     assert [one["address"] for one in joined] == [address]
     assert "num_cpus" not in joined[0]
 

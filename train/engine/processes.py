@@ -93,7 +93,7 @@ class ProcessEngine:
 
     def _send(self, worker: _Worker, job: Job) -> None:
         # A process that is dead already will be found so when it is heard.
-        with suppress(BrokenPipeError):
+        with suppress(ConnectionError):
             worker.connection.send(job)
 
     def _process(self) -> tuple[Any, Any]:
@@ -143,5 +143,5 @@ def _serve(connection: Connection, stop: Any) -> None:
         try:
             job: Job = connection.recv()
             connection.send(ending_of(job, report))
-        except (EOFError, BrokenPipeError):
+        except (EOFError, ConnectionError):
             return

@@ -59,7 +59,8 @@ class RayEngine:
     """See :class:`~.job.Engine`.
 
     Args:
-        jobs: At a time; default: one a core.
+        jobs: At a time, of one thread each; one of more threads takes the place of as many. Default: one a
+            core.
         address: HOST:PORT of a cluster, of which this machine is a node; default: this machine alone.
 
     Raises:
@@ -90,8 +91,11 @@ class RayEngine:
                 ray.init(log_to_driver=False, logging_level="CRITICAL", **self._place())
                 self._begin()
                 break
-            except Exception as error:
+            # Ctrl-C, too: it takes seconds, and a folder must not stay.
+            except BaseException as error:
                 self.__exit__(type(error), error, error.__traceback__)
+                if not isinstance(error, Exception):
+                    raise
                 if not left:
                     raise DataError(f"Ray does not start ({' '.join(str(error).split())})") from None
         return self
@@ -188,7 +192,7 @@ def _knock(address: str) -> None:
         raise ConfigurationError(f"--address {address}: expected HOST:PORT, as 10.0.0.5:6379")
     try:
         socket.create_connection((host, int(port)), timeout=_KNOCK).close()
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, ValueError) as error:
         raise DataError(f"--address {address}: no Ray cluster answers ({error})") from None
 
 
