@@ -7,6 +7,7 @@ docs/training.md has what it found.
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +101,7 @@ def main() -> None:
         for seed in range(given.seeds):
             fields = fields_of(variant, seed, given.out)
             training = trained(given.out / f"{variant}-{seed}", "apg", fields)
-            last.append(float(training.status.best or 0.0))
+            last.append(math.inf if training.status.best is None else training.status.best)
             print(f"{variant}, seed {seed}: {last[-1]:.3g}", flush=True)
         spread = f"{number(min(last))} to {number(max(last))}"
         rows.append((variant, number(sum(last) / len(last)), spread))

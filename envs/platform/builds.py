@@ -22,7 +22,8 @@ _TRIES: Final = 100
 """Machines drawn for one that closes."""
 
 _DRAWS: Final = 16
-"""Numbers a machine takes, with room for more, so that adding one leaves the others as they were."""
+"""Numbers a machine takes, all of them in use. They come in one draw: another one more would change every
+machine after the first of a generator."""
 
 
 @configuration
