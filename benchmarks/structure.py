@@ -59,6 +59,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "preview": {"task": {"observation": {"preview": 10}}},
     "from-washout": {},
     "from-washout-unscaled": {"hyperparameters": {"standardise": False}},
+    "from-washout-muon": {"hyperparameters": {"hidden_rate": 0.1}},
     "whole-episode": {"hyperparameters": {"window": None}},
     "window-2s": {"hyperparameters": {"window": 2.0}},
     "window-2s-value": {"hyperparameters": {"window": 2.0, "value": {}}},
