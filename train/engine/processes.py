@@ -40,7 +40,8 @@ class ProcessEngine:
     def __init__(self, jobs: int) -> None:
         self._jobs = jobs
         self._context = multiprocessing.get_context("spawn")
-        self._stop = self._context.Event()
+        # No lock belongs to it, which a process that is killed could hold for ever.
+        self._stop: Any = self._context.RawValue("b", 0)
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> ProcessEngine:
@@ -62,14 +63,14 @@ class ProcessEngine:
     def run(self, source: Source, listener: Listener) -> bool:
         """Run jobs until there are none; returns whether Ctrl-C stopped them."""
         interrupt = Interrupt()
-        self._stop.clear()
+        self._stop.value = 0
         with interrupt.caught():
             self._fill(source)
             while busy := {worker.connection: worker for worker in self._workers if worker.job is not None}:
                 for connection in wait(list(busy), _PATIENCE):
                     self._hear(busy[connection], listener)
                 if interrupt.asked:
-                    self._stop.set()
+                    self._stop.value = 1
                 else:
                     self._fill(source)
         return interrupt.asked
@@ -137,7 +138,7 @@ def _serve(connection: Connection, stop: Any) -> None:
 
     def report(status: Status) -> bool:
         connection.send(status)
-        return bool(stop.is_set())
+        return bool(stop.value)
 
     while True:
         try:
