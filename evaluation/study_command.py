@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from .criteria import Criteria
 from .provenance import head_of
 from .study import Condition, StudyOutcome, run_study
 from .study_results import StudyResults, common_maneuvers, summarise
-from .study_store import check_kept
+from .study_store import check_kept, forget_kept
 from .study_tables import matrix_table, print_study, share_tables
 from .suite_progress import suite_progress
 from .text_table import save_markdown, table_console
@@ -27,7 +26,7 @@ def prepare(out: Path, fresh: bool) -> None:
     check_folder("--out", out)
     check_own_json("--out", out / "study.json", frozenset({"schema", "conditions"}))
     if fresh:
-        shutil.rmtree(out / "pairs", ignore_errors=True)
+        forget_kept(out)
     check_kept(out)
 
 
@@ -58,10 +57,7 @@ def run_and_save(
     with suite_progress(count) as advance:
         outcome = run_study(conditions, policies, out, advance)
     results = results_of(conditions, list(policies), outcome, words)
-    results.save_json(out / "study.json")
-    results.save_csv(out / "study.csv")
-    left_out = [f"Left out: {line}" for line in results.told_left_out()]
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results), *left_out)
+    _write(results, out, title, ratios)
     image = figure(results)
     if image is not None:
         write_bytes(out / "study.png", image)
@@ -73,6 +69,14 @@ def run_and_save(
         markup=False,
     )
     return 1 if results.failures else 0
+
+
+def _write(results: StudyResults, out: Path, title: str, ratios: bool) -> None:
+    """What stays of a study, but its figure."""
+    results.save_json(out / "study.json")
+    results.save_csv(out / "study.csv")
+    left_out = [f"Left out: {line}" for line in results.told_left_out()]
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results), *left_out)
 
 
 def results_of(

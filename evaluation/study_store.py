@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ..envs.car import Car
 from ..envs.cues import CueTrace
@@ -17,6 +17,8 @@ from ..envs.storage import write_text
 from .file_names import plain_name
 from .metrics import Metrics
 from .provenance import package_version
+
+_FOLDER: Final = "pairs"
 
 
 @configuration
@@ -61,7 +63,7 @@ class PairStore:
     def __init__(self, folder: Path, condition: str, policy: str) -> None:
         tag = hashlib.sha256(f"{condition}\n{policy}".encode()).hexdigest()[:6]
         name = f"{plain_name(condition)}--{plain_name(policy)}-{tag}.json"
-        self._path = folder / "pairs" / name
+        self._path = folder / _FOLDER / name
         self._pair = self._load(condition, policy)
 
     def _load(self, condition: str, policy: str) -> KeptPair:
@@ -78,6 +80,20 @@ class PairStore:
         """Write a drive down at once, whole or not at all."""
         self._pair.drives[maneuver] = drive
         write_text(self._path, json.dumps(to_dict(self._pair), allow_nan=False) + "\n")
+
+
+def forget_kept(folder: Path) -> None:
+    """Remove the drives of a study, and nothing else that lies there.
+
+    Args:
+        folder: Of the study.
+    """
+    for path in _files(folder):
+        path.unlink()
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted((folder / _FOLDER).glob("*.json"))
 
 
 def _read(path: Path) -> KeptPair:
@@ -99,7 +115,7 @@ def check_kept(folder: Path) -> None:
     Raises:
         DataError: files are damaged.
     """
-    damaged = [path for path in sorted((folder / "pairs").glob("*.json")) if not _readable(path)]
+    damaged = [path for path in _files(folder) if not _readable(path)]
     if damaged:
         names = ", ".join(map(str, damaged))
         raise DataError(f"{names}: damaged, not the drives of a study; delete them, or add --fresh")

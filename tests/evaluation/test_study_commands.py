@@ -60,7 +60,10 @@ def test_compare_writes_everything_and_goes_on(cue_file, tmp_path, capsys):
     assert main(argv) == 2
     damaged = f"{first}, {second}: damaged, not the drives of a study; delete them, or add --fresh"
     assert capsys.readouterr().err == f"motion-cueing compare: {damaged}\n"
+    mine = first.with_name("mine.txt")
+    mine.write_text("not of this command")
     assert main([*argv, "--fresh"]) == 0
+    assert mine.exists()
     assert "10 of 10 drives driven now" in capsys.readouterr().out
 
 
