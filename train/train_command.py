@@ -50,7 +50,7 @@ class TrainCommand:
     """New folder for everything that comes of it; default: runs/ALGO-1 and so on."""
     resume: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of a training, seeds or a population to go on with, from the last checkpoints; --steps may
-    change how long it is. Or of a search, to go on with --search."""
+    change how long it is, but for a population. Or of a search, to go on with --search."""
     search: Annotated[int | None, arg(metavar="N")] = None
     """Search for hyperparameters instead, until N trainings are done; the field `search` of the configuration
     says what is varied, --steps how long each is."""
