@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-
 from rich.console import Console
 from rich.progress import TaskID
 
 from .engine.job import Ending, Job
-from .progress import line_of, make_bars, move
+from .progress import Bars
 from .training import Status
 
 
-class FleetProgress:
+class FleetProgress(Bars):
     """See :class:`~.engine.job.Listener`.
 
     Args:
@@ -20,28 +18,14 @@ class FleetProgress:
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True)
-        self._bars = make_bars(self._console)
+        super().__init__(console)
         self._tasks: dict[str, TaskID] = {}
-
-    def __enter__(self) -> FleetProgress:
-        """Show bars."""
-        self._bars.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Remove them."""
-        self._bars.stop()
 
     def told(self, job: Job, status: Status) -> None:
         """Move a training's bar, and write a line if there is news."""
         if job.name not in self._tasks:
-            self._tasks[job.name] = self._bars.add_task(job.name, total=status.total, rate="")
-        move(self._bars, self._tasks[job.name], status)
-        if status.news:
-            self._console.print(f"{job.name}: {line_of(status)}", highlight=False, soft_wrap=True)
+            self._tasks[job.name] = self._add(job.name, status.total)
+        self._move(self._tasks[job.name], status, f"{job.name}: ")
 
     def ended(self, job: Job, ending: Ending) -> None:
         """Remove a training's bar."""

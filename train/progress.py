@@ -14,35 +14,58 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from typing_extensions import Self
 
 from .training import Status
 
 
-def make_bars(console: Console) -> Progress:
-    """Bars with speed and time left; none but on a terminal."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-        transient=True,
-    )
+class Bars:
+    """Bars with speed and time left, none but on a terminal, and a line for each validation.
+
+    Args:
+        console: Where to write; default: the error stream.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True)
+        self._bars = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            console=self._console,
+            disable=not self._console.is_terminal,
+            transient=True,
+        )
+
+    def __enter__(self) -> Self:
+        """Show bars."""
+        self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove them."""
+        self._bars.stop()
+
+    def _add(self, name: str, total: int) -> TaskID:
+        return self._bars.add_task(name, total=total, rate="")
+
+    def _move(self, task: TaskID, status: Status, before: str = "") -> None:
+        """Move a bar to where a training is, and write a line if there is news."""
+        speed = next((bar.speed for bar in self._bars.tasks if bar.id == task), None)
+        rate = f"{speed:,.0f} a second" if speed else ""
+        self._bars.update(task, completed=status.steps, rate=rate)
+        if status.news:
+            self._console.print(f"{before}{line_of(status)}", highlight=False, soft_wrap=True)
 
 
-def move(bars: Progress, task: TaskID, status: Status) -> None:
-    """Move a bar to where a training is."""
-    speed = next((bar.speed for bar in bars.tasks if bar.id == task), None)
-    rate = f"{speed:,.0f} a second" if speed else ""
-    bars.update(task, completed=status.steps, rate=rate)
-
-
-class TrainingProgress:
-    """A bar with speed and time left, and a line for each validation.
+class TrainingProgress(Bars):
+    """What is seen of one training.
 
     Args:
         total: Actions in all.
@@ -50,26 +73,12 @@ class TrainingProgress:
     """
 
     def __init__(self, total: int, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True)
-        self._bar = make_bars(self._console)
-        self._task = self._bar.add_task("training", total=total, rate="")
-
-    def __enter__(self) -> TrainingProgress:
-        """Show the bar."""
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Remove it."""
-        self._bar.stop()
+        super().__init__(console)
+        self._task = self._add("training", total)
 
     def tell(self, status: Status) -> None:
         """Move the bar, and write a line if there is news."""
-        move(self._bar, self._task, status)
-        if status.news:
-            self._console.print(line_of(status), highlight=False, soft_wrap=True)
+        self._move(self._task, status)
 
 
 def line_of(status: Status) -> str:
