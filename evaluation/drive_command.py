@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -88,8 +89,8 @@ def run(command: DriveCommand) -> int:
 
 
 def _check(command: DriveCommand) -> None:
-    if command.rate < 1 or command.times < 1 or not command.after >= 0.0:
-        raise ConfigurationError("--rate and --times must be at least 1, --after at least 0")
+    if command.rate < 1 or command.times < 1 or not 0.0 <= command.after < math.inf:
+        raise ConfigurationError("--rate and --times must be at least 1, --after at least 0 and finite")
     if command.report is not None:
         check_file("--report", command.report)
 

@@ -145,6 +145,7 @@ def test_serve_refuses_in_one_line(words, told, capsys, tmp_path, monkeypatch):
         (["--to", "no such host"], "there is no host"),
         (["--drop", "1.5"], "--drop must be a share"),
         (["--times", "0"], "--times must be at least 1"),
+        (["--after", "inf"], "at least 0 and finite"),
         (["--maneuver", "all"], "means several drives"),
     ],
 )
