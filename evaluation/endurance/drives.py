@@ -14,8 +14,9 @@ from ...envs.errors import DataError
 from ...envs.task.library import slippery
 from .options import Endurance
 
-_FRICTION_STREAM: Final = 1
 _MACHINE_STREAM: Final = 2
+_FRICTION_STREAM: Final = 3
+"""Beside the seed of a drive; 1 is the road's unevenness."""
 
 
 @dataclass(frozen=True, eq=False)

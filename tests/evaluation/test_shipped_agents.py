@@ -7,7 +7,10 @@ import pytest
 
 from motion_cueing.baselines import ClassicalWashout
 from motion_cueing.envs.car import get_maneuver, maneuver_names
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.platform.actuators import ActuatorDynamics
 from motion_cueing.evaluation import Metrics, Trajectory, measure, rollout
+from motion_cueing.evaluation.disturbances import with_dynamics
 from motion_cueing.train.agent import Agent, agent_names, get_agent
 
 WASHOUTS = ("classical", "classical-tuned")
@@ -72,6 +75,19 @@ def test_it_tilts_no_faster_than_the_tuned_washout(agent, measured, washouts):
     faster = {n for n, ours in measured.items() if ours.tilt_rate_peak > tuned[n].tilt_rate_peak}
     longer = {n for n, ours in measured.items() if ours.tilt_rate_share > tuned[n].tilt_rate_share}
     assert (faster, longer) == TILTS_MORE.get(agent.name, (set(), set()))
+
+
+@pytest.mark.parametrize("name", ["learned", "learned-perceived", "learned-preview"])
+def test_late_actuators_delay_what_is_felt_and_no_more(name):
+    """Lag and dead time at the slow end of what motion bases have, as docs/endurance.md has for hours."""
+    agent, paper = get_agent(name), get_platform("paper")
+    slow = with_dynamics(paper, ActuatorDynamics(natural_frequency=30.0, dead_time=0.05))
+    drives = [get_maneuver(maneuver).drive() for maneuver in ("braking", "slalom", "roundabout")]
+    at_once, late = (
+        np.mean([measure(rollout(agent.on(platform), cues, platform)).cue_error for cues in drives])
+        for platform in (paper, slow)
+    )
+    assert at_once < late < 1.5 * at_once
 
 
 def test_no_limit_of_the_machine_is_exceeded(driven):
