@@ -19,7 +19,7 @@ SLOWER: Final = "slower"
 """Name of the condition with machines whose actuators have a lag and a dead time."""
 
 _EVENLY: Final[dict[str, Any]] = dict.fromkeys(KINDS, 1.0)
-_EVERY_KIND: Final = RandomDrives(**_EVENLY, cars=tuple(car_names()))
+_EVERY_KIND: Final = RandomDrives(**_EVENLY, roughness=(0.0, 600.0), cars=tuple(car_names()))
 
 
 @configuration
@@ -30,7 +30,8 @@ class Endurance:
     14 Hz, what motion bases are said to have (from memory).
 
     Args:
-        drives: What drives are drawn from; default: every kind of road in every car, equally often.
+        drives: What drives are drawn from; default: every kind of road in every car, equally often,
+            smooth to rough.
         duration: Of a drive, s.
         friction: Range of a factor on the tires' friction.
         natural_frequency: Range of the actuators' lag, rad/s, drawn for each subsystem of a machine.
