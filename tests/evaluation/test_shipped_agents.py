@@ -16,7 +16,7 @@ from motion_cueing.train.agent import Agent, agent_names, get_agent
 WASHOUTS = ("classical", "classical-tuned")
 """The better one by hand, and the better one on the roads that agents are trained on."""
 TILTS_MORE = {
-    "learned": ({"braking", "acceleration", "slalom", "stop-and-go"}, {"acceleration", "step-steer"}),
+    "learned": ({"braking", "acceleration", "step-steer", "stop-and-go"}, {"acceleration", "step-steer"}),
 }
 """Where an agent misses the bar, as docs/agents.md says: drives with a larger tilt rate than the tuned
 washout's, and with a large one for longer."""
