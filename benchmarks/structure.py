@@ -39,13 +39,7 @@ BASE: dict[str, Any] = {
             "random_start": True,
         },
     },
-    "hyperparameters": {
-        "learning_rate": 6.0e-4,
-        "window": 10.0,
-        "outlier": 3.0,
-        "offset": 1.0,
-        "standardise": True,
-    },
+    "hyperparameters": {"learning_rate": 6.0e-4, "window": 10.0, "outlier": 3.0, "offset": 1.0},
     "validation": {"every": EVERY, "drives": 24},
     "checkpoints": {"every": STEPS // 2},
 }
@@ -55,14 +49,12 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "base": {},
     "machine-frame": {"task": {"observation": {"frame": "machine"}, "action": {"frame": "machine"}}},
     "no-memory": {"task": {"observation": {"memory": []}}},
-    "unscaled": {"hyperparameters": {"standardise": False}},
     "preview": {"task": {"observation": {"preview": 10}}},
+    "standard-of-springs": {"hyperparameters": {"standardise": True}},
     "from-washout": {},
-    "from-washout-unscaled": {"hyperparameters": {"standardise": False}},
+    "from-washout-window-2s": {"hyperparameters": {"window": 2.0}},
+    "from-washout-window-2s-value": {"hyperparameters": {"window": 2.0, "value": {}}},
     "from-washout-muon": {"hyperparameters": {"hidden_rate": 0.1}},
-    "whole-episode": {"hyperparameters": {"window": None}},
-    "window-2s": {"hyperparameters": {"window": 2.0}},
-    "window-2s-value": {"hyperparameters": {"window": 2.0, "value": {}}},
 }
 """What each changes."""
 
