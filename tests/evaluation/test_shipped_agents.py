@@ -77,17 +77,15 @@ def test_it_tilts_no_faster_than_the_tuned_washout(agent, measured, washouts):
     assert (faster, longer) == TILTS_MORE.get(agent.name, (set(), set()))
 
 
-@pytest.mark.parametrize("name", ["learned", "learned-perceived", "learned-preview"])
-def test_late_actuators_delay_what_is_felt_and_no_more(name):
-    """Lag and dead time at the slow end of what motion bases have, as docs/endurance.md has for hours."""
+@pytest.mark.parametrize("name", ["learned", "learned-any", "learned-perceived", "learned-preview"])
+def test_late_actuators_change_nothing_of_what_it_asks_for(name):
+    """There is no loop through the actuators that lag and dead time could make swing."""
     agent, paper = get_agent(name), get_platform("paper")
     slow = with_dynamics(paper, ActuatorDynamics(natural_frequency=30.0, dead_time=0.05))
-    drives = [get_maneuver(maneuver).drive() for maneuver in ("braking", "slalom", "roundabout")]
-    at_once, late = (
-        np.mean([measure(rollout(agent.on(platform), cues, platform)).cue_error for cues in drives])
-        for platform in (paper, slow)
-    )
-    assert at_once < late < 1.5 * at_once
+    cues = get_maneuver("slalom").drive()
+    at_once, late = (rollout(agent.on(platform), cues, platform) for platform in (paper, slow))
+    np.testing.assert_allclose(late.action, at_once.action, rtol=0.0, atol=1e-3)
+    assert np.abs(late.f_felt - at_once.f_felt).max() > 0.1
 
 
 def test_no_limit_of_the_machine_is_exceeded(driven):
