@@ -39,18 +39,24 @@ BASE: dict[str, Any] = {
             "random_start": True,
         },
     },
-    "hyperparameters": {"learning_rate": 6.0e-4, "window": 10.0, "outlier": 3.0, "offset": 1.0},
+    "hyperparameters": {
+        "learning_rate": 6.0e-4,
+        "window": 10.0,
+        "outlier": 3.0,
+        "offset": 1.0,
+        "standardise": True,
+    },
     "validation": {"every": EVERY, "drives": 24},
     "checkpoints": {"every": STEPS // 2},
 }
-"""The variant `base`: from springs, in the cab's frame, with memory."""
+"""The variant `base`: from springs and relative to what they do, in the cab's frame, with memory."""
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "base": {},
     "machine-frame": {"task": {"observation": {"frame": "machine"}, "action": {"frame": "machine"}}},
     "no-memory": {"task": {"observation": {"memory": []}}},
     "preview": {"task": {"observation": {"preview": 10}}},
-    "standard-of-springs": {"hyperparameters": {"standardise": True}},
+    "unscaled": {"hyperparameters": {"standardise": False}},
     "from-washout": {},
     "from-washout-window-2s": {"hyperparameters": {"window": 2.0}},
     "from-washout-window-2s-value": {"hyperparameters": {"window": 2.0, "value": {}}},
