@@ -17,6 +17,10 @@ WASHOUTS = ("classical", "classical-tuned")
 """The better one by hand, and the better one on the roads that agents are trained on."""
 TILTS_MORE = {
     "learned": ({"braking", "acceleration", "step-steer", "stop-and-go"}, {"acceleration", "step-steer"}),
+    "learned-perceived": (
+        {"braking", "acceleration", "obstacle-avoidance", "slalom", "step-steer", "stop-and-go", "roundabout"},
+        {"steady-turn", "braking", "acceleration", "step-steer", "stop-and-go"},
+    ),
 }
 """Where an agent misses the bar, as docs/agents.md says: drives with a larger tilt rate than the tuned
 washout's, and with a large one for longer."""
