@@ -18,7 +18,15 @@ WASHOUTS = ("classical", "classical-tuned")
 TILTS_MORE = {
     "learned": ({"braking", "acceleration", "step-steer", "stop-and-go"}, {"acceleration", "step-steer"}),
     "learned-perceived": (
-        {"braking", "acceleration", "obstacle-avoidance", "slalom", "step-steer", "stop-and-go", "roundabout"},
+        {
+            "braking",
+            "acceleration",
+            "obstacle-avoidance",
+            "slalom",
+            "step-steer",
+            "stop-and-go",
+            "roundabout",
+        },
         {"steady-turn", "braking", "acceleration", "step-steer", "stop-and-go"},
     ),
 }
