@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import cycle
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -16,12 +15,15 @@ from tyro.conf import Positional, arg
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.storage import replacing
 from ..envs.targets import check_file
-from .figure_style import RC, new_figure, styled
+from .figure_style import line_styles, new_figure, styled
 
 Curve = NDArray[np.float64]
 """(2, k) steps and values."""
 
 _SUFFIXES: Final = (".png", ".svg")
+_INSIDE: Final = 4
+"""Groups whose legend has room among the curves."""
+
 _MILLION: Final = 1e6
 
 
@@ -95,18 +97,20 @@ def draw(groups: Mapping[str, list[Curve]], scalar: str) -> Any:
     """A figure with a line and a band for each group."""
     figure = new_figure(6.4, 3.4)
     axes = figure.subplots()
-    colours = cycle(RC["axes.prop_cycle"].by_key()["color"])
+    styles = line_styles(list(groups))
     for name, seeds in groups.items():
-        colour = next(colours)
+        style = styles[name]
         steps = seeds[0][0]
         values = np.array([np.interp(steps, *curve) for curve in seeds])
         label = f"{name} ({len(seeds)} seeds)" if len(seeds) > 1 else name
-        axes.plot(steps / _MILLION, values.mean(axis=0), color=colour, label=label)
-        axes.fill_between(
-            steps / _MILLION, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0
-        )
+        axes.plot(steps / _MILLION, values.mean(axis=0), label=label, **style)
+        low, high = values.min(axis=0), values.max(axis=0)
+        axes.fill_between(steps / _MILLION, low, high, color=style["color"], alpha=0.2, linewidth=0)
     axes.set_yscale("log")
     axes.set_xlabel("actions, million")
     axes.set_ylabel(scalar)
-    axes.legend()
+    if len(groups) > _INSIDE:
+        figure.legend(loc="outside right upper")
+    else:
+        axes.legend()
     return figure
