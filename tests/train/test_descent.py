@@ -58,10 +58,10 @@ def test_a_hidden_layer_moves_by_the_rate_in_every_direction_and_nothing_else_do
 @pytest.mark.parametrize("rate", [None, 0.02])
 def test_it_goes_down_and_goes_on_from_its_state_bit_for_bit(rate):
     actor, seen, told = learner()
-    descent, first = Descent(actor, 1e-2, rate, 1.0), float(loss(actor, seen, told))
+    descent, first = Descent(actor, 1e-2, rate, 1.0), loss(actor, seen, told).item()
     for k in range(20):
         step(descent, actor, seen, told, done=k / 40)
-    assert float(loss(actor, seen, told)) < 0.7 * first
+    assert loss(actor, seen, told).item() < 0.7 * first
     again = copy.deepcopy(actor)
     other = Descent(again, 1e-2, rate, 1.0)
     other.restore(copy.deepcopy(descent.state()))
