@@ -13,6 +13,7 @@ from typing import Any
 
 from motion_cueing.evaluation.text_table import TextTable, number, print_table, table_console
 from motion_cueing.train.config import load_config, merge
+from motion_cueing.train.logs import read_log
 from motion_cueing.train.run import RunFolder
 from motion_cueing.train.training import Training
 
@@ -88,7 +89,7 @@ def fields_of(variant: str, seed: int, out: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Train, and print the lowest validation J of each."""
+    """Train, and print the lowest and the last validation J of each."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=3)
@@ -96,16 +97,21 @@ def main() -> None:
     given = parser.parse_args()
     rows = []
     for variant in given.variants:
-        last = []
+        best, last = [], []
         for seed in range(given.seeds):
-            fields = fields_of(variant, seed, given.out)
-            training = trained(given.out / f"{variant}-{seed}", "apg", fields)
-            last.append(math.inf if training.status.best is None else training.status.best)
-            print(f"{variant}, seed {seed}: {last[-1]:.3g}", flush=True)
-        spread = f"{number(min(last))} to {number(max(last))}"
-        rows.append((variant, number(sum(last) / len(last)), spread))
-    header = ("variant", "mean", "lowest to highest")
-    print_table(table_console(), TextTable("Best validation J", header, tuple(rows)))
+            folder = given.out / f"{variant}-{seed}"
+            training = trained(folder, "apg", fields_of(variant, seed, given.out))
+            best.append(math.inf if training.status.best is None else training.status.best)
+            last.append(read_log(folder)[-1].get("validation/J", math.inf))
+            print(f"{variant}, seed {seed}: {best[-1]:.3g}, at the end {last[-1]:.3g}", flush=True)
+        rows.append((variant, *spread(best), *spread(last)))
+    header = ("variant", "best", "lowest to highest", "at the end", "lowest to highest")
+    print_table(table_console(), TextTable("Validation J", header, tuple(rows)))
+
+
+def spread(values: list[float]) -> tuple[str, str]:
+    """Mean, and lowest to highest."""
+    return number(sum(values) / len(values)), f"{number(min(values))} to {number(max(values))}"
 
 
 if __name__ == "__main__":
