@@ -39,6 +39,8 @@ class Criteria:
         delay_range: Largest delay or lead searched, s; a cue that comes later is a missing cue instead.
         delay_correlation: Least correlation at which a delay is reported at all.
         action_tolerance: An applied acceleration this near the asked one is not clipped, m/s^2 and rad/s^2.
+        vibration_above: Motion of a higher frequency is vibration, Hz.
+        vibration_window: Length over which it is averaged, s (the running RMS of ISO 2631-1).
         references: Policies between which the share of the gap is measured.
     """
 
@@ -50,6 +52,8 @@ class Criteria:
     delay_range: Positive = 1.0
     delay_correlation: Positive = 0.5
     action_tolerance: Positive = 1e-4
+    vibration_above: Positive = 4.0
+    vibration_window: Positive = 1.0
     references: References = References()
 
     @property

@@ -55,6 +55,7 @@ class Rung:
         false_cues: Mean share of time with a false cue.
         tilt_rate_peak: Largest of all drives, rad/s.
         tilt_rate_share: Mean share of time above the tilt-coordination limit.
+        vibration: Largest of all drives, m/s^2; None where not measured.
         at_limit: Mean share of time with any actuator at any limit.
         step_time_mean: Mean of the drives' means, s; None where not measured.
         step_time_p99: Largest 99th percentile of a drive, s.
@@ -67,6 +68,7 @@ class Rung:
     false_cues: float
     tilt_rate_peak: float
     tilt_rate_share: float
+    vibration: float | None
     at_limit: float
     step_time_mean: float | None
     step_time_p99: float | None
@@ -96,6 +98,7 @@ def _rung(standing: Standing, drives: list[Metrics]) -> Rung:
         false_cues=_mean([m.false_cues for m in drives]),
         tilt_rate_peak=max(m.tilt_rate_peak for m in drives),
         tilt_rate_share=_mean([m.tilt_rate_share for m in drives]),
+        vibration=_measured(max, [m.vibration for m in drives]),
         at_limit=_mean([m.at_limit for m in drives]),
         step_time_mean=_measured(_mean, [m.step_time_mean for m in drives]),
         step_time_p99=_measured(max, [m.step_time_p99 for m in drives]),
@@ -127,6 +130,7 @@ def numbers_of(rung: Rung) -> Mapping[str, float | str | None]:
         "false_cues": rung.false_cues,
         "tilt_rate_peak": rung.tilt_rate_peak,
         "tilt_rate_share": rung.tilt_rate_share,
+        "vibration": rung.vibration,
         "at_limit": rung.at_limit,
         "step_time_mean": rung.step_time_mean,
         "step_time_p99": rung.step_time_p99,

@@ -91,6 +91,8 @@ class Metrics:
         step_time_mean: Mean time the policy takes a step, s; None where not measured.
         step_time_p99: 99th percentile of it, s.
         step_time_max: Longest of the drive, s.
+        vibration: Of the specific force, beyond the car's own, in its worst second, m/s^2; None where the
+            drive is too short or too coarse.
     """
 
     duration: float
@@ -111,6 +113,7 @@ class Metrics:
     step_time_mean: float | None
     step_time_p99: float | None
     step_time_max: float | None = None
+    vibration: float | None = None
 
     @property
     def worst_axis(self) -> str:
@@ -149,6 +152,9 @@ def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics
         step_time_mean=mean,
         step_time_p99=p99,
         step_time_max=longest,
+        vibration=signals.vibration(
+            wanted[:, :3], felt[:, :3], trajectory.dt, criteria.vibration_above, criteria.vibration_window
+        ),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
+from scipy.signal import butter, correlate, sosfiltfilt
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -113,3 +113,31 @@ def missing_cues(wanted: Floats, felt: Floats, threshold: float) -> Mask:
 def beyond(wanted: Floats, felt: Floats) -> Floats:
     """The part of ``felt`` outside the interval between zero and ``wanted``: motion nobody asked for."""
     return np.asarray(felt - np.clip(felt, np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)))
+
+
+def vibration(wanted: Floats, felt: Floats, dt: float, above: float, window: float) -> float | None:
+    """How much ``felt`` shakes more than ``wanted`` in its worst window.
+
+    The root of the largest difference of their mean squares over a window, after a high-pass (Butterworth of
+    order 4, run both ways). What the car itself does above the frequency does not count, in whatever phase
+    the simulator follows it.
+
+    Args:
+        wanted: (n, k) signals of the car.
+        felt: (n, k) signals of the simulator.
+        dt: Time step, s.
+        above: Corner frequency, Hz.
+        window: Length of the window, s.
+
+    Returns:
+        None where the signals are shorter than a window, or sampled too seldom to hold the frequency.
+    """
+    count = round(window / dt)
+    if not 1 < count < len(wanted) or above * dt >= 0.5:
+        return None
+    filters = butter(4, above, "highpass", fs=1.0 / dt, output="sos")
+    of_car, of_cab = (
+        np.sum(sosfiltfilt(filters, x, axis=0, padlen=count) ** 2, axis=1) for x in (wanted, felt)
+    )
+    sums = np.concatenate([[0.0], np.cumsum(of_cab - of_car)])
+    return float(np.sqrt(max(0.0, np.max(sums[count:] - sums[:-count]) / count)))

@@ -101,3 +101,43 @@ def test_beyond_is_the_distance_to_the_interval_from_zero_to_wanted(wanted, felt
     for w, f, extra in zip(wanted, felt, signals.beyond(wanted, felt), strict=True):
         low, high = min(0.0, w), max(0.0, w)
         assert extra == pytest.approx(f - high if f > high else f - low if f < low else 0.0)
+
+
+TIME = np.arange(0.0, 6.0, 0.01)
+
+
+def shaking(amplitude: float, frequency: float, *, until: float = 6.0) -> np.ndarray:
+    """(n, 2) of which the second shakes for a while."""
+    wave = amplitude * np.sin(2.0 * np.pi * frequency * TIME) * (until > TIME)
+    return np.column_stack([np.zeros_like(TIME), wave])
+
+
+@pytest.mark.parametrize("frequency", [8.0, 15.0, 25.0])
+def test_vibration_is_the_rms_of_what_shakes(frequency):
+    found = signals.vibration(shaking(0.0, 1.0), shaking(0.3, frequency), 0.01, 4.0, 1.0)
+    assert found == pytest.approx(0.3 / np.sqrt(2.0), rel=0.03)
+
+
+def test_vibration_is_that_of_the_worst_second():
+    found = signals.vibration(shaking(0.0, 1.0), shaking(0.3, 10.0, until=0.5), 0.01, 4.0, 1.0)
+    assert found == pytest.approx(0.3 / np.sqrt(2.0) * np.sqrt(0.5), rel=0.05)
+
+
+def test_slow_motion_and_rest_are_no_vibration():
+    rest = shaking(0.0, 1.0)
+    assert signals.vibration(rest, rest - 9.81, 0.01, 4.0, 1.0) == pytest.approx(0.0, abs=1e-9)
+    assert signals.vibration(rest, shaking(5.0, 0.5), 0.01, 4.0, 1.0) < 0.02
+
+
+def test_the_cars_own_vibration_is_not_the_simulators():
+    car, late = shaking(0.3, 10.0), np.roll(shaking(0.3, 10.0), 3, axis=0)
+    assert signals.vibration(car, late, 0.01, 4.0, 1.0) < 0.06  # from the ends alone
+    assert signals.vibration(car, shaking(0.0, 1.0), 0.01, 4.0, 1.0) == 0.0
+    both = signals.vibration(car, np.sqrt(2.0) * late, 0.01, 4.0, 1.0)
+    assert both == pytest.approx(0.3 / np.sqrt(2.0), rel=0.05)
+
+
+@pytest.mark.parametrize(("samples", "dt"), [(100, 0.01), (600, 0.125), (1, 0.01)])
+def test_vibration_of_what_is_too_short_or_coarse_is_undefined(samples, dt):
+    quiet = np.zeros((samples, 3))
+    assert signals.vibration(quiet, quiet, dt, 4.0, 1.0) is None
