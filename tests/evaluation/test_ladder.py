@@ -156,11 +156,16 @@ def test_a_rung_is_worked_out_over_the_drives_that_all_finished():
 def test_a_rung_takes_the_longest_step_and_the_mean_of_means():
     results = results_of(GAINS)
     slow = replace(
-        results.maneuvers["late"]["mpc"], step_time_mean=4e-5, step_time_p99=5e-3, step_time_max=9e-3
+        results.maneuvers["late"]["mpc"],
+        step_time_mean=4e-5,
+        step_time_p99=5e-3,
+        step_time_max=9e-3,
+        vibration=7.0,
     )
     maneuvers = {**results.maneuvers, "late": {**results.maneuvers["late"], "mpc": slow}}
     rung = next(rung for rung in rungs(Results.of(maneuvers, [], ORIGIN)) if rung.policy == "mpc")
     assert (rung.step_time_mean, rung.step_time_p99, rung.step_time_max) == pytest.approx((3e-5, 5e-3, 9e-3))
+    assert rung.vibration == 7.0
 
 
 def test_the_ladder_is_written_and_drawn(tmp_path):

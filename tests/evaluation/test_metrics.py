@@ -99,6 +99,16 @@ def test_tilt_at_exactly_the_limit_is_not_above_it():
     assert measure(trajectory(w_felt=w)).tilt_rate_share == 0.0
 
 
+def test_vibration_is_of_the_specific_force_alone():
+    def vibration(**columns):
+        return measure(trajectory(dt=0.01, **columns)).vibration
+
+    shaking = np.outer(0.2 * np.sin(20.0 * np.pi * 0.01 * np.arange(201)), [0.0, 0.0, 1.0])
+    assert vibration(f_felt=REST + shaking) == pytest.approx(0.2 / np.sqrt(2.0), rel=0.03)
+    assert vibration(w_felt=shaking) == pytest.approx(0.0, abs=1e-9)
+    assert vibration(f_wanted=REST + shaking) == 0.0
+
+
 def test_strokes_are_shares_of_the_nearer_reached_limit():
     legs = np.zeros((201, 6))
     legs[7, 2], legs[9, 2], legs[5, 4] = 0.335, -0.5, 0.067
