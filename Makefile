@@ -8,7 +8,7 @@ WORKERS ?= 2
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
-PACKAGES := envs baselines evaluation train
+PACKAGES := envs baselines train evaluation realtime cli
 CHECKED := $(PACKAGES) tests benchmarks examples
 TYPES := build/types
 

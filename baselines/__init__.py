@@ -2,7 +2,8 @@
 
 from .policy import ForeknowingPolicy, NoMotion, Policy
 from .registry import default_policies, describe_policy, make_policy, policy_names
-from .washout import ClassicalWashout, WashoutParameters
+from .washout.parameters import WashoutParameters
+from .washout.policy import ClassicalWashout
 
 __all__ = [
     "ClassicalWashout",

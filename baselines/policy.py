@@ -14,11 +14,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..envs.arrays import FLOAT
 from ..envs.cues import CueTrace
 from ..envs.errors import DataError
-from ..envs.observation import OBSERVATION_SIZE
-from ..envs.precision import FLOAT
-from ..envs.simulator import N_AXES
+from ..envs.simulator.kernels.observation import OBSERVATION_SIZE
+from ..envs.simulator.simulator import N_AXES
 
 Array = NDArray[Any]
 
@@ -37,7 +37,8 @@ class Policy(Protocol):
         """Accelerations for observations.
 
         Args:
-            observation: (n, OBSERVATION_SIZE) or (OBSERVATION_SIZE,), see ``envs.observation``.
+            observation: (n, OBSERVATION_SIZE) or (OBSERVATION_SIZE,), see
+            ``envs.simulator.kernels.observation``.
             state: What the last call returned; None at first.
             episode_start: (n,) whether each environment has just been reset.
             deterministic: No effect on a policy without randomness.

@@ -28,11 +28,11 @@ from rich.table import Table
 
 from benchmarks.predictive import MANEUVERS, steps
 from benchmarks.report import machine, yes
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.evaluation import rollout
-from motion_cueing.evaluation.wrapped import Wrapped
-from motion_cueing.train.agent import Agent, agent_names, get_agent
-from motion_cueing.train.agent.export import INPUT, OUTPUT, export_onnx
+from motion_cueing.evaluation.rollout import Wrapped
+from motion_cueing.train.agents import Agent, agent_names, get_agent
+from motion_cueing.train.agents.export import INPUT, OUTPUT, export_onnx
 
 FASTER = 400.0
 """Times than the nonlinear controller that an agent shall be."""

@@ -18,14 +18,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation.loop.controller import Controller, ControllerOptions
-from motion_cueing.evaluation.loop.formats import make_format
-from motion_cueing.evaluation.loop.inbox import Inbox
-from motion_cueing.evaluation.loop.limit_check import LimitCheck
-from motion_cueing.evaluation.loop.machine import make_machine
-from motion_cueing.evaluation.loop.packets import Cues, Format
-from motion_cueing.evaluation.loop.watchdog import Patience
 from motion_cueing.evaluation.policies import make_policy
+from motion_cueing.realtime.client import LimitCheck
+from motion_cueing.realtime.controller import Controller, ControllerOptions
+from motion_cueing.realtime.inbox import Inbox
+from motion_cueing.realtime.machine import make_machine
+from motion_cueing.realtime.packets import Cues, Format, make_format
+from motion_cueing.realtime.watchdog import Patience
 
 RATE = 1000
 WILD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0.0, -0.0, 1e3, -1e3, 100.0, 1e6)

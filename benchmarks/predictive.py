@@ -23,9 +23,9 @@ from rich.table import Table
 
 from motion_cueing.baselines import make_policy
 from motion_cueing.baselines.mpc import Margins, MpcParameters
-from motion_cueing.baselines.mpc.linearisation import Linearised
-from motion_cueing.baselines.predictive import DESCRIPTIONS
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.baselines.mpc.prediction import Linearised
+from motion_cueing.baselines.registry import DESCRIPTIONS
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import rollout
 

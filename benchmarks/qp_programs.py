@@ -9,12 +9,18 @@ import numpy as np
 from scipy import sparse
 
 from motion_cueing.baselines.mpc import MpcParameters, load_mpc
-from motion_cueing.baselines.mpc.grid import Grid, make_grid
-from motion_cueing.baselines.mpc.linearisation import N_CUES, Linearisation, Linearised, cue_scales
-from motion_cueing.baselines.mpc.planner import Planned, Planner
 from motion_cueing.baselines.mpc.policy import make_controller
+from motion_cueing.baselines.mpc.prediction import (
+    N_CUES,
+    Grid,
+    Linearisation,
+    Linearised,
+    cue_scales,
+    make_grid,
+)
 from motion_cueing.baselines.mpc.problem import Bounds, Plan, Problem, Quadratic
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.baselines.mpc.solver import Planned, Planner
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import rollout
 

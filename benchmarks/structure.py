@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from motion_cueing.evaluation.text_table import TextTable, number, print_table, table_console
+from motion_cueing.evaluation.reporting.text import TextTable, number, print_table, table_console
 from motion_cueing.train.config import load_config, merge
 from motion_cueing.train.logs import read_log
 from motion_cueing.train.run import RunFolder

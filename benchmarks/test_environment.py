@@ -12,7 +12,7 @@ from gymnasium.vector import SyncVectorEnv
 
 import motion_cueing.envs
 from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.observation import OBSERVATION_SIZE
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.envs.task import DrivingSimulatorVector
 
 from .test_step import describe

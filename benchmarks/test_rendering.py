@@ -10,7 +10,7 @@ from motion_cueing.envs import ENVIRONMENT_ID
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.rendering import FRAMES_PER_SECOND, Renderer
 from motion_cueing.envs.rendering.renderer import SIZE
-from motion_cueing.envs.simulator import TIME_STEP
+from motion_cueing.envs.simulator.simulator import TIME_STEP
 from tests.rendering.moments import moment, weaving
 
 from .test_step import describe

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.simulator.simulator import Simulator
 
 from .workloads import commands, kernel, reference, repeated
 

@@ -14,8 +14,8 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 
+from motion_cueing.train.algorithms.sb3.learner import make_learner
 from motion_cueing.train.config import load_config
-from motion_cueing.train.sb3_learner import make_learner
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 from .test_step import describe

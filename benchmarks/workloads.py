@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from motion_cueing.envs.platform import Platform, get_platform
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.simulator.simulator import Simulator
 from tests.reference import ReferenceSimulator
 from tests.reference.comparison import restless_drive
 

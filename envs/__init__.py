@@ -3,6 +3,4 @@
 from .cues import GRAVITY, CueTrace
 from .registration import ENVIRONMENT_ID, register
 
-register()
-
-__all__ = ["ENVIRONMENT_ID", "GRAVITY", "CueTrace"]
+__all__ = ["ENVIRONMENT_ID", "GRAVITY", "CueTrace", "register"]

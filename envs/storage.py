@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import tempfile
@@ -9,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
+
+from .errors import DataError
 
 
 @contextmanager
@@ -46,3 +49,78 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a binary file in one piece."""
     with replacing(path, "wb") as file:
         file.write(data)
+
+
+# Where a command writes, checked before the work: a place that takes files, and nobody else's file.
+
+
+def check_folder(option: str, folder: Path) -> None:
+    """Refuse a folder that cannot be written. It is not made: a wrong argument later leaves nothing behind.
+
+    Args:
+        option: That names it, such as ``--out``.
+        folder: It need not exist.
+
+    Raises:
+        DataError: it is a file or lies below one, or it takes no files.
+    """
+    _check(option, folder, folder)
+
+
+def check_file(option: str, file: Path) -> None:
+    """Refuse a file that cannot be written.
+
+    Args:
+        option: That names it, such as ``--out``.
+        file: It need not exist, nor its folder.
+
+    Raises:
+        DataError: it is a folder or lies below a file, or its folder takes no files.
+    """
+    if file.is_dir():
+        raise DataError(f"{option} {file} is a folder; name a file")
+    _check(option, file, file.absolute().parent)
+
+
+def check_own_json(option: str, file: Path, keys: frozenset[str]) -> None:
+    """Refuse to write over a file of JSON that is none of ours.
+
+    Args:
+        option: That names its folder, such as ``--out``.
+        file: It need not exist.
+        keys: That every version of ours has.
+
+    Raises:
+        DataError: it is another's.
+    """
+    if not file.exists():
+        return
+    try:
+        values = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        values = None
+    if not isinstance(values, dict) or not keys <= values.keys():
+        raise DataError(f"{file} was not written by this command; move it away, or name another {option}")
+
+
+def _check(option: str, target: Path, folder: Path) -> None:
+    """Try the nearest folder there is."""
+    try:
+        nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+        if not nearest.is_dir():
+            told = "" if nearest == target else f"{target}: "
+            raise DataError(f"{option} {told}{nearest} is a file; name a folder")
+        probe(nearest)
+    except OSError as error:
+        reason = error.strerror or error
+        raise DataError(f"{option} {target} cannot be written ({reason}); name another folder") from None
+
+
+def probe(folder: Path) -> None:
+    """Make a file in a folder, and remove it: permissions alone do not tell (read-only disks, root).
+
+    Raises:
+        OSError: the folder takes no files.
+    """
+    with tempfile.TemporaryFile(dir=folder):
+        pass

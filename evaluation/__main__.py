@@ -1,17 +1,9 @@
-"""``python -m motion_cueing.evaluation``: the command line; without a subcommand it evaluates."""
+"""``python -m motion_cueing.evaluation``: the command line; without a command it evaluates."""
 
 import sys
 
-from .command_line import main
-
-_OVERVIEW = ("-h", "--help", "--version")
-
-
-def with_default(arguments: list[str]) -> list[str]:
-    """Put ``evaluate`` before options that name no subcommand."""
-    bare = not arguments or (arguments[0].startswith("-") and arguments[0] not in _OVERVIEW)
-    return ["evaluate", *arguments] if bare else arguments
-
+from ..cli.__main__ import with_default
+from ..cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main(with_default(sys.argv[1:])))

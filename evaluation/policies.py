@@ -8,10 +8,9 @@ from .. import baselines
 from ..baselines import ForeknowingPolicy, Policy
 from ..envs.errors import UnknownNameError
 from ..envs.platform import Platform
-from ..train.agent import Agent, agent_names, get_agent
-from ..train.agent.files import SUFFIX
-from .drivers import TaskPolicy
-from .own_machine import on_machine
+from ..train.agents import Agent, agent_names, get_agent
+from ..train.agents.files import SUFFIX
+from .rollout import TaskPolicy, on_machine
 from .selection import is_file
 
 

@@ -1,8 +1,10 @@
-"""The result of an evaluation as ``results.json`` and ``results.csv``; see docs/results-format.md."""
+"""Rows of numbers as CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
@@ -10,12 +12,32 @@ from typing import Any, Final
 from pydantic import JsonValue
 
 from ..envs.settings import configuration, to_dict
-from .criteria import Criteria
-from .metrics import Metrics
+from ..envs.storage import write_text
+from .comparison import Share, Standing, Verdict, judge, judge_suite, shares
+from .metrics import Criteria, Metrics
 from .saved import Saved
-from .share import Share, shares
-from .spreadsheet import save_rows
-from .verdict import Standing, Verdict, judge, judge_suite
+
+
+def save_rows(
+    rows: Sequence[Mapping[str, Any]], path: str | Path, header: Sequence[str] | None = None
+) -> None:
+    """Write rows under a header, whole or not at all; what is None becomes an empty cell.
+
+    Args:
+        rows: Cells by column.
+        path: The file.
+        header: Columns; those of the first row if not given.
+    """
+    columns = list(header or (rows[0] if rows else ()))
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, buffer.getvalue())
+
+
+# The result of an evaluation as ``results.json`` and ``results.csv``; see docs/results-format.md.
+
 
 SCHEMA: Final = 1
 """Version of ``results.json``; a reader refuses others."""

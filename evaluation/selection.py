@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError, UnknownNameError
 from ..envs.settings import load
-from .ladder import ALL_RUNGS, ladder_names
+from .benchmark import ALL_RUNGS, ladder_names
 from .suite import CueSource, labels
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def find_maneuvers(names: Sequence[str], car: Car) -> dict[str, CueSource]:
 
     Files are read here, so that a broken one is refused before anything is driven.
     """
-    from ..envs.car import get_maneuver, get_recording, maneuver_names, recording_names
+    from ..envs.maneuvers import get_maneuver, get_recording, maneuver_names, recording_names
 
     maneuvers, recordings = maneuver_names(), recording_names()
     known = [*maneuvers, *recordings]

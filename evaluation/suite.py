@@ -1,18 +1,55 @@
-"""Runs every policy on every maneuver; one that fails does not stop the others."""
+"""A bar for many drives, one after another."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Final
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..envs.cues import CueTrace
-from ..envs.errors import MotionCueingError
-from .criteria import Criteria
-from .metrics import Metrics, measure
-from .recording import notes_of
+from ..envs.errors import ConfigurationError, MotionCueingError
+from .metrics import Criteria, Metrics, measure
+from .reporting.text import how_many
 from .results import Failure
+from .rollout import notes_of
 from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..envs.platform import Platform
+
+
+@contextmanager
+def suite_progress(total: int) -> Iterator[Callable[[str, str], None]]:
+    """A bar on the terminal's error stream, so that the tables can be piped.
+
+    Args:
+        total: Number of drives.
+
+    Yields:
+        To be called before each drive, with two words about it.
+    """
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=total)
+        started = 0
+
+        def advance(what: str, who: str) -> None:
+            nonlocal started
+            bar.update(task, description=f"{what}: {who}", completed=started)
+            started += 1
+
+        yield advance
+
+
+# Runs every policy on every maneuver; one that fails does not stop the others.
+
 
 CueSource = Callable[[], CueTrace]
 """Makes the cues of a maneuver; called once, when it is its turn."""
@@ -20,11 +57,11 @@ Drive = Callable[[CueTrace], Trajectory]
 """One policy on the machine: takes the cues of a maneuver through it."""
 Finish = Callable[[str, Mapping[str, Trajectory]], None]
 """Receives the trajectories of a maneuver by policy before they are dropped."""
-Progress = Callable[[str, str], None]
+OnDrive = Callable[[str, str], None]
 """Told the maneuver and the policy before each drive."""
 
 SETUP: Final = "cues"
-"""Given to :data:`Progress` in place of a policy while the car drives the maneuver."""
+"""Given to :data:`OnDrive` in place of a policy while the car drives the maneuver."""
 
 
 @dataclass(eq=False)
@@ -48,7 +85,7 @@ def run_suite(
     maneuvers: Mapping[str, CueSource],
     policies: Mapping[str, Drive],
     finish: Finish,
-    progress: Progress = lambda maneuver, policy: None,
+    progress: OnDrive = lambda maneuver, policy: None,
     criteria: Criteria | None = None,
 ) -> Outcome:
     """Drive every maneuver with every policy and measure it.
@@ -100,7 +137,7 @@ def _measure_all(
 
 
 def _drive_all(
-    maneuver: str, cues: CueTrace, policies: Mapping[str, Drive], progress: Progress, outcome: Outcome
+    maneuver: str, cues: CueTrace, policies: Mapping[str, Drive], progress: OnDrive, outcome: Outcome
 ) -> dict[str, Trajectory]:
     drives: dict[str, Trajectory] = {}
     for name, drive in policies.items():
@@ -138,3 +175,106 @@ def labels(names: Sequence[str], stems: Sequence[str], reserved: Collection[str]
             label, number = f"{stem}-{number}", number + 1
         found[name] = label
     return found
+
+
+# What went wrong in solves, as controllers count it in their notes: one line a policy.
+
+
+_TROUBLES: Final = {
+    "mpc_failures": "without a plan (the machine braked)",
+    "mpc_relaxed": "with a limit relaxed",
+    "mpc_unconverged": "unconverged",
+    "optimum_unconverged": "unconverged",
+    "optimum_braked": "without a plan (the machine braked)",
+}
+"""Counts that should be 0, and what they count."""
+_WHOLES: Final = {"mpc": ("mpc_solves", "solve"), "optimum": ("optimum_windows", "window")}
+"""By the first word of a count: the count it is a part of, and of what."""
+_MOST: Final = 3
+"""Drives that are named; the others are counted."""
+
+Notes = Mapping[str, Mapping[str, str]]
+"""What a policy counted, by drive."""
+
+
+def trouble_lines(notes: Iterable[tuple[str, str, Mapping[str, str]]]) -> dict[str, str]:
+    """What each policy counted that should not be, in words; policies with nothing of the kind are missing.
+
+    Args:
+        notes: Policy, drive and what the policy counted there.
+    """
+    drives: dict[str, dict[str, Mapping[str, str]]] = {}
+    for policy, drive, counted in notes:
+        drives.setdefault(policy, {})[drive] = counted
+    told = {policy: _told(found) for policy, found in drives.items()}
+    return {policy: line for policy, line in told.items() if line}
+
+
+def _told(drives: Notes) -> str:
+    return "; ".join(text for trouble in _TROUBLES if (text := _trouble(trouble, drives)))
+
+
+def _trouble(trouble: str, drives: Notes) -> str:
+    """One kind of trouble: how many of how many, and in which drives, most first."""
+    whole, noun = _WHOLES[trouble.partition("_")[0]]
+    found = {name: _number(counted, trouble) for name, counted in drives.items()}
+    found = {name: count for name, count in found.items() if count > 0}
+    if not found:
+        return ""
+    totals = {name: _number(counted, whole) for name, counted in drives.items()}
+    order = sorted(found, key=lambda name: -found[name])
+    named = ", ".join(f"{name} {found[name]} of {totals[name]}" for name in order[:_MOST])
+    more = f", and {how_many(len(order) - _MOST, 'more drive')}" if len(order) > _MOST else ""
+    total = how_many(sum(totals.values()), noun)
+    return f"{sum(found.values())} of {total} {_TROUBLES[trouble]} ({named}{more})"
+
+
+def _number(counted: Mapping[str, str], name: str) -> int:
+    """A count; 0 where a policy of somebody else's notes something that is none."""
+    text = counted.get(name, "0")
+    return int(text) if text.isdecimal() else 0
+
+
+def print_troubles(console: Console, notes: Iterable[tuple[str, str, Mapping[str, str]]]) -> None:
+    """Show :func:`trouble_lines`."""
+    for policy, line in trouble_lines(notes).items():
+        console.print(f"[bold]counted[/bold] {escape(policy)}: {escape(line)}", highlight=False)
+
+
+# Drives that were driven already, such as those of `motion-cueing serve`, in an evaluation.
+
+
+DRIVEN: Final = "driven"
+"""What the recorded drive is called beside policies that drive the same cues."""
+
+
+def load_drives(files: Sequence[Path], platform: Platform) -> dict[str, Trajectory]:
+    """Recorded drives by label: the names of their files.
+
+    Args:
+        files: Saved trajectories.
+        platform: The machine they must have been driven on.
+
+    Raises:
+        DataError: a file is missing, broken or no trajectory.
+        ConfigurationError: a drive is of another machine.
+    """
+    names = labels([str(file) for file in files], [file.stem for file in files])
+    drives = {label: Trajectory.load(name) for name, label in names.items()}
+    for label, drive in drives.items():
+        if drive.platform != platform.name:
+            raise ConfigurationError(
+                f"{label} was driven on the motion base {drive.platform!r}, not {platform.name!r}; "
+                "name it with --platform"
+            )
+    return drives
+
+
+def cue_sources(drives: Mapping[str, Trajectory]) -> dict[str, CueSource]:
+    """The cues of each drive, to drive them again."""
+    return {label: partial(cues_of, drive, label) for label, drive in drives.items()}
+
+
+def cues_of(drive: Trajectory, name: str) -> CueTrace:
+    """The cues that were wanted in a drive."""
+    return CueTrace(name, drive.time, drive.f_wanted, drive.w_wanted, source=f"as driven by {drive.policy}")

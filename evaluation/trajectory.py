@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.errors import DataError
-from ..envs.platform import ACTUATORS
+from ..envs.platform.kernels import ACTUATORS
 from ..envs.storage import write_bytes
 
 Floats = NDArray[np.float64]

@@ -19,10 +19,10 @@ from torch import nn
 
 import motion_cueing.envs
 from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.task import ActionOptions, EpisodeOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import measure, rollout
-from motion_cueing.train.agent import Agent, Network, Record
+from motion_cueing.train.agents import Agent, Network, Record
 
 TASK = TaskOptions(
     observation=ObservationOptions(preview=10, preview_spacing=0.1, frame="cab"),

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy
-from motion_cueing.envs.car import get_maneuver
-from motion_cueing.envs.observation import read
+from motion_cueing.envs.maneuvers import get_maneuver
+from motion_cueing.envs.simulator.kernels.observation import read
 from motion_cueing.evaluation import measure, rollout
 
 

@@ -14,11 +14,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.task import ActionOptions, EpisodeOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import measure, rollout
-from motion_cueing.train.agent import Agent, Record
-from motion_cueing.train.from_sb3 import network_of
+from motion_cueing.train.agents import Agent, Record
+from motion_cueing.train.algorithms.sb3.policy import network_of
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 TASK = TaskOptions(

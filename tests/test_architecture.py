@@ -11,7 +11,7 @@ import pytest
 
 from .repository import PACKAGES, ROOT, package_files
 
-BASICS = {"envs.errors", "envs.settings", "envs.storage", "envs.precision", "envs.cues"}
+BASICS = {"envs.errors", "envs.settings", "envs.storage", "envs.arrays", "envs.cues"}
 """Modules every room may use."""
 
 ALLOWED = {
@@ -71,10 +71,10 @@ def room(module: str) -> str | None:
 
 
 def test_the_imports_of_known_modules_are_found():
-    assert "envs.platform.frames" in imports("baselines.washout.step")
+    assert "envs.platform.kernels.geometry" in imports("baselines.washout.kernels.step")
     assert {"envs.cues", "evaluation.trajectory", "baselines.policy"} <= imports("evaluation.rollout")
-    assert "evaluation.policies" not in imports("evaluation.evaluate_command", everywhere=False)
-    assert "evaluation.policies" in imports("evaluation.evaluate_command")
+    assert "evaluation.policies" not in imports("cli.evaluate", everywhere=False)
+    assert "evaluation.policies" in imports("cli.evaluate")
     assert set(ALLOWED) == set(PACKAGES)
 
 

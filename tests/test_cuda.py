@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import warp as wp
 
-from motion_cueing.envs.observation import observe_forward
-from motion_cueing.envs.step import reset_forward, step_kernel
+from motion_cueing.envs.simulator.kernels.observation import observe_forward
+from motion_cueing.envs.simulator.kernels.step import reset_forward, step_kernel
 
 # Loops kept as loops: the same code in a third of the time to compile.
 step_in_loops = wp.kernel(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from motion_cueing.evaluation.command_line import COMMANDS, main
+from motion_cueing.cli.main import COMMANDS, main
 from motion_cueing.evaluation.provenance import package_version
 
 from .car import synthetic_log

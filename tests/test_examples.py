@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import torch
 
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.evaluation import measure, rollout
-from motion_cueing.train.agent import Agent
+from motion_cueing.train.agents import Agent
 
 from .repository import ROOT
 

@@ -9,9 +9,10 @@ import pytest
 
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ActionError
-from motion_cueing.envs.gradient import Unroll
-from motion_cueing.envs.platform import ActuatorDynamics, Platform, get_platform
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.platform import Platform, get_platform
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
+from motion_cueing.envs.simulator.kernels.gradient import Unroll
+from motion_cueing.envs.simulator.simulator import Simulator
 
 STEPS, BATCH = 200, 2
 

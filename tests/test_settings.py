@@ -25,8 +25,8 @@ import motion_cueing.baselines
 import motion_cueing.envs
 import motion_cueing.evaluation
 from motion_cueing.baselines.washout import load_washout, washout_presets
-from motion_cueing.envs.car import get_maneuver
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import Turntable
 from motion_cueing.envs.settings import (
     NonNegative,

@@ -11,7 +11,7 @@ import warp as wp
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ActionError, ConfigurationError, DataError
 from motion_cueing.envs.platform import Cab, get_platform
-from motion_cueing.envs.simulator import TIME_STEP, Simulator
+from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
 
 from .reference.comparison import bits
 

@@ -1,1 +1,1 @@
-"""What learned policies are trained on."""
+"""Training of motion cueing agents."""

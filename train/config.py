@@ -10,8 +10,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, JsonValue
 
 from ..baselines.washout import WashoutParameters, load_washout
-from ..envs.car import drive_seeds
 from ..envs.errors import ConfigurationError
+from ..envs.maneuvers import drive_seeds
 from ..envs.settings import Positive, configuration, from_dict, read_yaml
 from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomisationOptions, TaskOptions
 from .registry import algorithm_names, get_algorithm, preset_file

@@ -16,6 +16,7 @@ from rich.progress import (
 )
 from typing_extensions import Self
 
+from .experiments.engines import Ending, Job
 from .training import Status
 
 
@@ -91,3 +92,30 @@ def line_of(status: Status) -> str:
         f"perceived {score.perceived_error:.2f}, reward {score.reward:.2f}, "
         f"limited {100.0 * score.limited:.2f} %"
     )
+
+
+# What a person sees while several agents are trained: bars, and a line for each validation.
+
+
+class FleetProgress(Bars):
+    """See :class:`~.engine.job.Listener`.
+
+    Args:
+        console: Where to write; default: the error stream.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        super().__init__(console)
+        self._tasks: dict[str, TaskID] = {}
+
+    def told(self, job: Job, status: Status) -> None:
+        """Move a training's bar, and write a line if there is news."""
+        if job.name not in self._tasks:
+            self._tasks[job.name] = self._add(job.name, status.total)
+        self._move(self._tasks[job.name], status, f"{job.name}: ")
+
+    def ended(self, job: Job, ending: Ending) -> None:
+        """Remove a training's bar."""
+        task = self._tasks.pop(job.name, None)
+        if task is not None:
+            self._bars.remove_task(task)

@@ -14,8 +14,8 @@ import warp as wp
 from ..envs.cues import CueTrace
 from ..envs.errors import ActionError
 from ..envs.task.batch import Batch
+from ..envs.task.environment import task_options
 from ..envs.task.options import TaskOptions
-from ..envs.task.spaces import task_options
 
 
 @dataclass(frozen=True)

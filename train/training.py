@@ -1,27 +1,100 @@
-"""A training from beginning or checkpoint to its end: log, validation, checkpoints, agents."""
+"""A training that begins with the network of an agent there is already."""
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from ..baselines import ClassicalWashout
+from ..envs.errors import ConfigurationError
 from ..envs.settings import from_dict, to_dict
-from ..envs.task.library import platform_of
-from .agent import Agent, Record
-from .base_policy import DEFAULT, base_parameters
-from .config import Measure
-from .initial import initial_agent
-from .interrupt import Interrupt
-from .learner import Learner, StopTraining
+from ..envs.task.batch import Batch
+from ..envs.task.drives import platform_of
+from .agents import Agent, Network, Record
+from .agents.base_policy import DEFAULT, base_parameters
+from .config import Measure, TrainingConfig
 from .logs import TrainingLog
-from .registry import make_learner
+from .networks import Actor, begin_at_rest
+from .registry import Learner, StopTraining, make_learner
 from .run import RunFolder
 from .validation import Score, Validation
+
+
+def initial_agent(config: TrainingConfig) -> Agent | None:
+    """The agent of ``config.initial``, or None where nothing is named.
+
+    Raises:
+        DataError: the file cannot be read.
+    """
+    return None if config.initial is None else Agent.load(config.initial)
+
+
+def initial_network(config: TrainingConfig) -> Network | None:
+    """Its network.
+
+    Raises:
+        DataError: the file cannot be read.
+        ConfigurationError: that agent sees, does or drives something else.
+    """
+    agent = initial_agent(config)
+    if agent is None:
+        return None
+    for name in ("platform", "observation", "action"):
+        theirs, ours = getattr(agent.task, name), getattr(config.task, name)
+        if theirs != ours:
+            raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {ours}")
+    return agent.network
+
+
+def begin(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
+    """Give an actor the weights of the initial network, or let it begin at rest where none is named.
+
+    Raises:
+        DataError: the agent's file cannot be read, or its network is built in another way.
+        ConfigurationError: that agent sees, does or drives something else.
+    """
+    network = initial_network(config)
+    if network is None:
+        begin_at_rest(actor, batch)
+    else:
+        actor.load(network)
+
+
+# Ctrl-C as a question that is answered between updates.
+
+
+class Interrupt:
+    """Whether Ctrl-C was pressed; the second time it interrupts at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Hold SIGINT back within the block; only the main thread can."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        earlier = signal.signal(signal.SIGINT, self._ask)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, earlier)
+
+    def _ask(self, number: int, frame: Any) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+
+# A training from beginning or checkpoint to its end: log, validation, checkpoints, agents.
+
 
 Tell = Callable[["Status"], None]
 """Shown the status at every boundary."""

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..baselines.policy import Policy
-from ..envs.observation import OBSERVATION_SIZE
+from ..envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ..envs.task.batch import Batch
 from ..envs.task.environment import normalised
+from ..envs.task.kernels.reward import N_TERMS, TERMS
 from ..envs.task.options import ActionOptions, TaskOptions
-from ..envs.task.reward_kernel import N_TERMS, TERMS
-from .base_policy import base_policy
+from .agents.base_policy import base_policy
 from .config import TrainingConfig, validation_task
 
 Act = Callable[[NDArray[np.float32]], ArrayLike]

@@ -15,19 +15,19 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
-from ..envs.snapshot import Snapshot
+from ..envs.simulator.simulator import Snapshot
 from ..envs.task.batch import Batch
-from ..envs.task.environment import normalised
-from ..envs.task.options import TaskOptions
-from ..envs.task.reward_kernel import N_TERMS, TERMS
-from ..envs.task.spaces import (
+from ..envs.task.environment import (
     action_space,
     frames_per_second,
+    normalised,
     observation_space,
     pictures_of,
     rendered,
     task_options,
 )
+from ..envs.task.kernels.reward import N_TERMS, TERMS
+from ..envs.task.options import TaskOptions
 
 
 class DrivingSimulatorVecEnv(VecEnv):

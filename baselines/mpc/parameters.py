@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from ...envs.settings import NonNegative, Positive, configuration
-from ...envs.simulator import TIME_STEP
+from ...envs.simulator.simulator import TIME_STEP
 from ..presets import load_preset, preset_names
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -181,3 +181,23 @@ def load_mpc(name: str | Path) -> MpcParameters:
         ConfigurationError: a field is wrong.
     """
     return load_preset(MpcParameters, "predictive controller", name, _FOLDER)
+
+
+# What the nonlinear controller is told beside what the linear one is.
+
+
+@configuration
+class NmpcParameters:
+    """A nonlinear predictive controller.
+
+    Args:
+        algorithm: What a file of such parameters says it is.
+        mpc: Horizon, forecast, weights and margins, as of the linear one.
+        iterations: Most programs a plan. 1 is the real-time iteration, which is the linear controller.
+        tolerance: A step that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
+    """
+
+    algorithm: Literal["nmpc"] = "nmpc"
+    mpc: MpcParameters = MpcParameters()
+    iterations: Annotated[int, Field(ge=1, le=100)] = 10
+    tolerance: Positive = 0.05

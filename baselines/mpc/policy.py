@@ -1,25 +1,163 @@
-"""Model predictive control as a policy."""
+"""Braking to a stop: what a controller does without a plan."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...envs.cues import CueTrace
 from ...envs.platform import Platform
-from ...envs.simulator import N_AXES, TIME_STEP
+from ...envs.simulator.kernels.observation import read
+from ...envs.simulator.simulator import N_AXES, TIME_STEP
 from ..policy import Array, checked_episode_start, checked_observation, wrong_state
-from .braking import Brakes
-from .forecast import Forecaster
-from .linearisation import Floats
-from .memory import Counts, Memory, Moment, moment_of
-from .parameters import MpcParameters
-from .planner import Planner
-from .threads import OneThread
+from ..symbolic import SymbolicMachine, cs
+from .parameters import MpcParameters, NmpcParameters
+from .prediction import REST, Floats, Forecaster
+from .problem import moving_axes
+from .solver import OneThread, Planned, Planner, Rows
+
+_ROUNDS: Final = 3
+"""Newton's steps to the platform's accelerations; each squares the error."""
+
+_LEAST: Final = 1e-3
+"""Of the Jacobian's singular values, relative to the largest: directions in which legs move less are left."""
+
+_SHARE: Final = 1.0 - 1e-6
+"""Of the acceleration limits, so that rounding does not exceed them."""
+
+
+class Brakes:
+    """Accelerations that bring every actuator to rest by itself, as fast as its acceleration limit lets it.
+
+    So each leg stops where its own limits say it can; the platform's accelerations are those that give
+    the legs their rates at the end of the step.
+    """
+
+    def __init__(self, platform: Platform) -> None:
+        machine = SymbolicMachine(platform)
+        q, v, a = (cs.SX.sym(name, N_AXES) for name in ("q", "v", "a"))
+        after = machine.leg_rates(q + TIME_STEP * v + 0.5 * TIME_STEP**2 * a, v + TIME_STEP * a)
+        self._after = cs.Function("after", [q, v, a], [after, cs.jacobian(after, a[2:8])])
+        self._rates = machine.leg_rates
+        self._change = _SHARE * TIME_STEP * machine.limits["acceleration"]
+        self._moving = np.isin(np.arange(N_AXES), moving_axes(platform))
+
+    def __call__(self, position: Floats, rate: Floats) -> Floats:
+        """(9,) accelerations for the next time step.
+
+        Args:
+            position: (9,) of the axes.
+            rate: (9,).
+        """
+        legs = np.asarray(self._rates(position, rate))[:, 0]
+        actuators = np.concatenate([rate[:2], legs, rate[8:]])
+        wanted = actuators - np.clip(actuators, -self._change, self._change)
+        action = (wanted - actuators) / TIME_STEP
+        action[2:8] = 0.0
+        for _ in range(_ROUNDS):
+            after, slope = (np.asarray(part) for part in self._after(position, rate, action))
+            # Least squares: near a singular pose no accelerations give the legs all of their rates.
+            action[2:8] += np.linalg.lstsq(slope, wanted[2:8] - after[:, 0], rcond=_LEAST)[0]
+        return np.asarray(np.where(self._moving, action, 0.0))
+
+
+# What a predictive controller sees, remembers and counts.
+
+
+_RELAXED: Final = 1e-3
+"""Violation of a linearised limit from which on a plan counts as relaxed, share of half its range."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a controller sees: positions and rates (9,), the car's cues and the cues' error (6,), SI."""
+
+    position: Floats
+    rate: Floats
+    wanted: Floats
+    error: Floats
+
+
+def moment_of(row: NDArray[Any], angle: float) -> Moment:
+    """What an observation says.
+
+    Args:
+        row: (OBSERVATION_SIZE,) of one machine.
+        angle: Of the turntable a time step ago; the one measured is the nearest to it, rad.
+    """
+    sine, cosine = read(row, "turntable")
+    measured = float(np.arctan2(sine, cosine))
+    turned = measured + 2.0 * np.pi * round((angle - measured) / (2.0 * np.pi))
+    position = [*(read(row, name) for name in ("carriage", "displacement", "beta")), np.array([turned])]
+    rate = [read(row, name) for name in ("carriage_rate", "velocity", "beta_rate", "turntable_rate")]
+    wanted = np.concatenate([read(row, "wanted_force"), read(row, "wanted_rate")])
+    felt = np.concatenate([read(row, "felt_force"), read(row, "felt_rate")])
+    # Observed forces have gravity at rest taken off.
+    return Moment(np.concatenate(position), np.concatenate(rate), wanted + REST, felt - wanted)
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a controller knows of one machine.
+
+    Args:
+        sample: Of the drive, counted from the start.
+        angle: Turntable angle, unwound, rad.
+        plan: (n, 9) accelerations at the nodes when it was made.
+        age: Time steps since.
+        solved: Whether there is a plan.
+        active: Limits that held in it.
+        error: (6,) of the cues in the last step.
+        lasts: (6,) what of the car's cues lasts; None at the start.
+        sensors: (6, 3) states of the vestibular filters.
+    """
+
+    sample: int
+    angle: float
+    plan: Floats
+    age: int
+    solved: bool
+    active: Rows
+    error: Floats
+    lasts: Floats | None
+    sensors: Floats
+
+
+@dataclass
+class Counts:
+    """What a controller counted.
+
+    Args:
+        solves: Plans made.
+        failures: Plans that were not found; the machine braked.
+        iterations: Programs solved for them.
+        rounds: Duals solved for them.
+        unconverged: Plans still on the move after their last program, where there may be several.
+        relaxed: Plans in which a linearised limit could not be kept.
+    """
+
+    solves: int = 0
+    failures: int = 0
+    iterations: int = 0
+    rounds: int = 0
+    unconverged: int = 0
+    relaxed: int = 0
+
+    def add(self, planned: Planned) -> None:
+        """One more."""
+        self.solves += 1
+        self.failures += not planned.solved
+        self.iterations += planned.iterations
+        self.rounds += planned.rounds
+        self.unconverged += not planned.converged
+        self.relaxed += planned.relaxed > _RELAXED
+
+
+# Model predictive control as a policy.
 
 
 class PredictiveController:
@@ -194,3 +332,26 @@ def make_mpc(
     """
     parameters = parameters or MpcParameters()
     return make_controller(platform, parameters, Planner(platform, parameters), name)
+
+
+# Nonlinear model predictive control: each plan is the solution of the nonlinear program.
+#
+# The machine's nine axes are double integrators, so shooting from node to node is exact whatever the
+# accelerations, and the states are eliminated. What is nonlinear are the cues (rotating frames) and the
+# legs; sequential quadratic programming linearises them again about each new plan until it no longer
+# changes, with a search along each change that takes the exact cost and the exact limits.
+
+
+def make_nmpc(
+    platform: Platform, parameters: NmpcParameters | None = None, name: str = "nmpc"
+) -> PredictiveController | PreviewController:
+    """Nonlinear predictive control.
+
+    Args:
+        platform: The machine.
+        parameters: Of the controller; default: without preview.
+        name: In tables.
+    """
+    parameters = parameters or NmpcParameters()
+    planner = Planner(platform, parameters.mpc, parameters.iterations, parameters.tolerance)
+    return make_controller(platform, parameters.mpc, planner, name, parameters)

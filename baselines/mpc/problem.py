@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...envs.platform import Platform, actuator_limits
-from ...envs.simulator import N_AXES
-from .grid import Grid
-from .linearisation import N_CUES, Floats, Linearisation, cue_scales
+from ...envs.simulator.simulator import N_AXES
 from .parameters import AxisWeights, MpcParameters
+from .prediction import N_CUES, Floats, Grid, Linearisation, cue_scales
 
 _TILT: slice = slice(3, 5)
 """Rows of the cab's roll and pitch rate among the cues."""

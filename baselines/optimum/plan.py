@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
-from dataclasses import asdict, dataclass
+import zipfile
+import zlib
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ...envs.cues import CueTrace
 from ...envs.errors import DataError
-from ...envs.simulator import N_AXES
+from ...envs.perception import VestibularModel
+from ...envs.platform import Platform
+from ...envs.platform.kernels.step import SINGULAR
+from ...envs.platform.machines import UNITY
+from ...envs.settings import to_dict
+from ...envs.simulator.simulator import N_AXES, Simulator, Snapshot
+from ...envs.storage import write_bytes
+from ..presets import cache_folder
+from .program import OptimumOptions
 
 
 @dataclass(frozen=True)
@@ -77,3 +92,176 @@ class Plan:
         shape = np.shape(self.accelerations)
         if len(shape) != 2 or shape[1] != N_AXES or not np.all(np.isfinite(self.accelerations)):
             raise DataError(f"a plan needs finite accelerations of shape (n, {N_AXES}), found {shape}")
+
+
+# Plans kept from one run to the next, by a hash of all that they follow from.
+#
+# They lie in the folder ``optimum`` of :func:`~..cache.cache_folder`.
+
+
+FORMULATION: Final = 3
+"""Version of the program: what changes its solutions raises it."""
+
+
+def plans_folder() -> Path:
+    """Where plans are kept."""
+    return cache_folder() / "optimum"
+
+
+def key_of(
+    platform: Platform,
+    options: OptimumOptions,
+    vestibular: VestibularModel,
+    cues: CueTrace,
+    start: NDArray[np.float64],
+) -> str:
+    """SHA-256 of everything that a plan follows from; names and descriptions do not count."""
+    machine = to_dict(platform)
+    for name in ("name", "description"):
+        del machine[name]
+    settings = [FORMULATION, machine, to_dict(options), to_dict(vestibular), round(cues.dt, 9)]
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
+    for values in (cues.specific_force, cues.angular_velocity, cues.angular_acceleration, start):
+        digest.update(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+    return digest.hexdigest()
+
+
+def keep(key: str, plan: Plan) -> None:
+    """Keep a plan; where the folder cannot be written, nothing is kept."""
+    buffer = io.BytesIO()
+    account = plan.account.to_json()
+    np.savez_compressed(
+        buffer,
+        accelerations=plan.accelerations,
+        start=plan.start,
+        account=np.array(account),
+        checksum=np.array(_checksum(plan.accelerations, plan.start, account)),
+    )
+    try:
+        write_bytes(_path(key), buffer.getvalue())
+    except OSError:
+        return
+
+
+def find(key: str, steps: int) -> Plan | None:
+    """The plan kept under a key; None where there is none, or a damaged one.
+
+    Args:
+        key: Of :func:`key_of`.
+        steps: Time steps it must have.
+    """
+    try:
+        with np.load(_path(key), allow_pickle=False) as file:
+            accelerations, start = np.array(file["accelerations"]), np.array(file["start"])
+            account, checksum = str(file["account"]), str(file["checksum"])
+        if checksum != _checksum(accelerations, start, account) or len(accelerations) != steps:
+            return None
+        return Plan(accelerations, start, Account.from_json(account))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, DataError):
+        return None
+
+
+def _path(key: str) -> Path:
+    return plans_folder() / f"{key}.npz"
+
+
+def _checksum(accelerations: NDArray[np.float64], start: NDArray[np.float64], account: str) -> str:
+    return hashlib.sha256(accelerations.tobytes() + start.tobytes() + account.encode()).hexdigest()
+
+
+# The real step, played ahead: whether a plan keeps every limit, what it is worth, and where it leads.
+
+
+Floats = NDArray[np.float64]
+
+_STRENGTH: Final = 1.0 - 1e-4
+"""Share of the limits to play with, so that braking, which uses them to the full, meets none by round-off."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """What became of some accelerations.
+
+    Args:
+        accelerations: (n, 9) that the machine followed.
+        clean: Whether it met no limit, so that they are those asked for.
+        states: (n,) rows of ``Simulator.state``.
+    """
+
+    accelerations: Floats
+    clean: bool
+    states: NDArray[Any]
+
+    @property
+    def singular(self) -> bool:
+        """Whether it was kept from a singular pose."""
+        return bool(np.any(self.states["limits"] & np.uint64(SINGULAR)))
+
+
+class Player:
+    """A machine without lag or dead time on its way through a drive, always the time step after.
+
+    Args:
+        platform: The machine.
+        cues: The drive.
+        vestibular: The driver's perception.
+        start: (9,) pose to begin at.
+    """
+
+    def __init__(
+        self, platform: Platform, cues: CueTrace, vestibular: VestibularModel, start: ArrayLike
+    ) -> None:
+        self._simulator = Simulator(_weakened(platform), cues, vestibular=vestibular, dt=cues.dt)
+        self._simulator.reset(start)
+
+    @property
+    def state(self) -> Any:
+        """A row of ``Simulator.state``."""
+        return self._simulator.state[0]
+
+    def snapshot(self) -> Snapshot:
+        """For :meth:`restore`."""
+        return self._simulator.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to where a snapshot was taken."""
+        self._simulator.restore(snapshot)
+
+    def play(self, accelerations: Floats) -> Played:
+        """Follow accelerations (n, 9)."""
+        states = np.zeros(len(accelerations), dtype=self._simulator.state.dtype)
+        if np.all(np.isfinite(accelerations)):
+            for k, acceleration in enumerate(accelerations):
+                states[k] = self._simulator.step(acceleration)[0]
+            return Played(accelerations, not np.any(states["limits"]), states)
+        return Played(accelerations, False, states)
+
+    def brake(self, steps: int) -> Played:
+        """Come to rest as fast as every actuator may, and stand."""
+        states = np.zeros(steps, dtype=self._simulator.state.dtype)
+        for k in range(steps):
+            states[k] = self._simulator.step(-self.rates() / self._simulator.dt)[0]
+        return Played(np.array(states["acceleration"], dtype=np.float64), True, states)
+
+    def positions(self) -> Floats:
+        """(9,) in the order of ``AXES``."""
+        return _axes(self.state["motion"], "position", "displacement", "beta")
+
+    def rates(self) -> Floats:
+        """(9,) in the order of ``AXES``."""
+        return _axes(self.state["motion"], "rate", "velocity", "beta_rate")
+
+
+def _axes(motion: Any, actuators: str, linear: str, angular: str) -> Floats:
+    parts = (motion[actuators][:2], motion[linear], motion[angular], motion[actuators][8:])
+    return np.concatenate(parts).astype(np.float64).reshape(N_AXES)
+
+
+def _weakened(platform: Platform) -> Platform:
+    parts: dict[str, Any] = {}
+    for name in ("carriage", "hexapod", "turntable"):
+        part = getattr(platform, name)
+        if part is not None:
+            speed, force = _STRENGTH * part.velocity, _STRENGTH * part.acceleration
+            parts[name] = replace(part, velocity=speed, acceleration=force, dynamics=UNITY)
+    return replace(platform, **parts)

@@ -1,25 +1,218 @@
-"""A window of a drive as a nonlinear program for IPOPT.
-
-    minimise    sum of squared errors / steps + effort
-    subject to  the motion from node to node, and the limits at every node.
-
-Variables are [q, v, x, a] of every node, one node behind another; constraints for each interval its end
-and the limits there. The matrices are given to IPOPT as they follow from the structure, so that nothing is
-found out by colouring, and a Hessian of Gauss and Newton keeps every step a descent.
-"""
+"""What goes on during a solve: its iterations, and Ctrl-C, which ends it after the iteration at hand."""
 
 from __future__ import annotations
 
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...envs.simulator import N_AXES
-from ..symbolic.library import Expression, cs
-from .assembly import assembled, nonzeros, repeated, triplets
-from .blocks import Blocks, interval_variables
-from .listener import Watch, listener
+from ...envs.simulator.simulator import N_AXES
+from ..symbolic import Expression, cs
+from .program import Interval, NodeLimits, OptimumOptions, effort
+
+OnIteration = Callable[[int], None]
+
+
+class Watch:
+    """Hears of iterations, and remembers whether an end was asked for.
+
+    Args:
+        tell: Called with the number of iterations done.
+    """
+
+    def __init__(self, tell: OnIteration | None = None) -> None:
+        self._tell = tell
+        self._done = 0
+        self._asked = False
+
+    def heard(self) -> bool:
+        """One more iteration is done; returns whether to stop."""
+        self._done += 1
+        if self._tell is not None:
+            self._tell(self._done)
+        return self._asked
+
+    @contextmanager
+    def solving(self) -> Iterator[None]:
+        """A solve.
+
+        CasADi would take a KeyboardInterrupt for a function that cannot be evaluated, and go on.
+
+        Raises:
+            KeyboardInterrupt: at the end of the solve, if Ctrl-C was pressed in it.
+        """
+        self._done, self._asked = 0, False
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = signal.signal(signal.SIGINT, lambda number, frame: self._ask())
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+        if self._asked:
+            raise KeyboardInterrupt
+
+    def _ask(self) -> None:
+        self._asked = True
+
+
+def listener(variables: int, constraints: int, parameters: int, watch: Watch) -> Expression:
+    """CasADi's call after every iteration.
+
+    Args:
+        variables: Of the program.
+        constraints: Of the program.
+        parameters: Of the program.
+        watch: Who hears of it.
+    """
+    sizes = {"x": variables, "f": 1, "g": constraints, "lam_x": variables, "lam_g": constraints}
+
+    class Listener(cs.Callback):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self.construct("listener", {})
+
+        def get_n_in(self) -> int:
+            return int(cs.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_sparsity_in(self, i: int) -> Any:
+            return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(i), parameters), 1)
+
+        def eval(self, arguments: Any) -> list[int]:
+            return [int(watch.heard())]
+
+    return Listener()
+
+
+# Functions of one interval, made of its expressions, and where their parts lie among all nodes' variables.
+#
+# A node's variables are w = [q, v, x, a]; an interval's are z = [w, b], b being the a of the next node.
+
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """CasADi functions of one interval, and of its first node.
+
+    The Hessian of the cost is Gauss and Newton's, that of the sum of squares with errors taken as linear:
+    it has no negative curvature, and near a good plan it is as good as the exact one. That of the limits
+    is exact.
+
+    Args:
+        cost: (z, wanted) to [errors' part, effort's part] (2,).
+        gradient: (z, wanted) to the gradient of their sum.
+        hessian: (z, wanted, scale) to the upper triangle of its Hessian times a scale.
+        end: (z, wanted) to q, v, x at the next node.
+        end_jacobian: (z, wanted) to its Jacobian.
+        limits: (w) to the values of the inequalities.
+        limits_jacobian: (w) to their Jacobian.
+        limits_hessian: (w, multipliers) to the upper triangle of the Hessian of their weighted sum.
+        node_size: Length of w.
+        state_size: Length of q, v, x.
+    """
+
+    cost: Expression
+    gradient: Expression
+    hessian: Expression
+    end: Expression
+    end_jacobian: Expression
+    limits: Expression
+    limits_jacobian: Expression
+    limits_hessian: Expression
+    node_size: int
+    state_size: int
+
+
+def blocks_of(part: Interval, limits: NodeLimits, options: OptimumOptions) -> Blocks:
+    """The functions of an interval with its limits; the mean of squared errors counts 1 a sample."""
+    w = cs.vertcat(part.q, part.v, part.x, part.a)
+    z = cs.vertcat(w, part.b)
+    errors = part.errors / np.sqrt(options.steps)
+    own = effort(part.q, part.v, part.a, part.b) * np.sqrt(options.effort)
+    residuals = cs.vertcat(errors, own)
+    slope = cs.jacobian(residuals, z)
+
+    scale, lam = cs.SX.sym("scale"), cs.SX.sym("lam", limits.value.numel())
+    curvature = cs.hessian(cs.dot(lam, limits.value), w)[0]
+
+    def function(name: str, inputs: list[Expression], value: Expression) -> Expression:
+        return cs.Function(name, inputs, [value], {"cse": True})
+
+    given = [z, part.wanted]
+    return Blocks(
+        cost=function("cost", given, cs.vertcat(cs.sumsqr(errors), cs.sumsqr(own))),
+        gradient=function("gradient", given, cs.gradient(cs.sumsqr(residuals), z)),
+        hessian=function("hessian", [*given, scale], cs.triu(2.0 * scale * slope.T @ slope)),
+        end=function("end", given, part.end),
+        end_jacobian=function("end_jacobian", given, cs.jacobian(part.end, z)),
+        limits=function("limits", [w], limits.value),
+        limits_jacobian=function("limits_jacobian", [w], cs.jacobian(limits.value, w)),
+        limits_hessian=function("limits_hessian", [w, lam], cs.triu(curvature)),
+        node_size=w.numel(),
+        state_size=w.numel() - N_AXES,
+    )
+
+
+def interval_variables(blocks: Blocks) -> Indices:
+    """Where z of the first interval lies among the variables of all nodes; the k-th lies k nodes further."""
+    w = np.arange(blocks.node_size)
+    return np.concatenate([w, blocks.node_size + w[-N_AXES:]])
+
+
+# Sparse matrices of a whole window, put together of one small matrix an interval.
+
+
+def triplets(function: Expression) -> tuple[Indices, Indices]:
+    """Rows and columns of the nonzeros of a function's matrix, in CasADi's order."""
+    sparsity = function.sparsity_out(0)
+    rows, columns = sparsity.get_triplet()
+    return np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64)
+
+
+def assembled(shape: tuple[int, int], parts: list[tuple[Indices, Indices, Expression]]) -> Expression:
+    """A sparse matrix of nonzeros at rows and columns, no place twice.
+
+    Args:
+        shape: Of the matrix.
+        parts: Rows, columns and values (a column of symbols) of each part.
+    """
+    rows, columns = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    order = np.lexsort((rows, columns))
+    sparsity = cs.Sparsity.triplet(*shape, rows[order].tolist(), columns[order].tolist())
+    return cs.MX(sparsity, cs.vertcat(*(part[2] for part in parts))[order.tolist()])
+
+
+def repeated(indices: Indices, step: int, which: Indices) -> Indices:
+    """Indices of a block for each of its places: shifted by ``step`` times each of ``which``."""
+    return (indices[None, :] + step * which[:, None]).ravel()
+
+
+def nonzeros(matrix: Expression) -> Expression:
+    """The nonzeros of a matrix as a column."""
+    return matrix.nz[:]
+
+
+# A window of a drive as a nonlinear program for IPOPT.
+#
+#     minimise    sum of squared errors / steps + effort
+#     subject to  the motion from node to node, and the limits at every node.
+#
+# Variables are [q, v, x, a] of every node, one node behind another; constraints for each interval its end
+# and the limits there. The matrices are given to IPOPT as they follow from the structure, so that nothing is
+# found out by colouring, and a Hessian of Gauss and Newton keeps every step a descent.
+
 
 _QUIET: Final = {"print_level": 0, "sb": "yes"}
 

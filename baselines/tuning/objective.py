@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
-from ..families import AnyWashout, kernels_of
 from ..washout.batch import WashoutBatch
+from ..washout.families import AnyWashout, kernels_of
 
 Floats = NDArray[np.float64]
 Measure = Literal["J", "perceived"]

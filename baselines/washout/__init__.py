@@ -1,4 +1,4 @@
-"""The paper's classical washout."""
+"""Washouts: the paper's classical washout, and what all washouts share."""
 
 from .parameters import HighPass, LowPass, TiltCoordination, WashoutParameters, load_washout, washout_presets
 from .policy import ClassicalWashout

@@ -11,19 +11,17 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ...envs.cue_cost import CueCost, zone
+from ...envs.arrays import real, vec9
 from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError
-from ...envs.gradient import add_cue_error, step_with_adjoint
 from ...envs.platform import Platform
-from ...envs.platform.state import SetPoint
-from ...envs.precision import real, vec9
-from ...envs.simulator import Simulator
-from ...envs.state import State
-from .classical import CLASSICAL
-from .family import Family, FamilyParameters, start_pose
-from .kernels import Score, act
-from .structs import Memory
+from ...envs.platform.kernels.step import SetPoint
+from ...envs.simulator.kernels.gradient import add_cue_error, step_with_adjoint
+from ...envs.simulator.kernels.step import CueCost, State, zone
+from ...envs.simulator.simulator import Simulator
+from .kernels.blocks import Memory
+from .kernels.step import Score, act
+from .policy import CLASSICAL, Family, FamilyParameters, start_pose
 
 Floats = NDArray[np.float64]
 

@@ -1,22 +1,136 @@
-"""A washout as a policy; the classical one."""
+"""What the classical, the adaptive and the optimal washout have in common: kernels that act, and a start."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, Protocol, TypeVar
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ...envs.observation import OBSERVATION_SIZE
+from ...envs.arrays import real, vec3, vec9
 from ...envs.platform.machines import Cab
-from ...envs.precision import real, vec9
-from ...envs.simulator import N_AXES, TIME_STEP
+from ...envs.settings import Vector2, Vector3
+from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
+from ...envs.simulator.simulator import N_AXES, TIME_STEP
 from ..policy import Array, checked_episode_start, checked_observation, wrong_state
-from .classical import CLASSICAL
-from .family import Family, FamilyParameters, start_pose
-from .parameters import WashoutParameters, load_washout
+from .kernels.blocks import HighPassParameters, Memory, Parameters, initial_memory
+from .kernels.step import drive_kernel, predict_kernel, washout
+from .parameters import HighPass, LowPass, TiltCoordination, WashoutParameters, load_washout
+
+
+class FamilyParameters(Protocol):
+    """A parameter set of any family."""
+
+    @property
+    def name(self) -> str:
+        """Of the set."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """One line for people."""
+        ...
+
+    @property
+    def start_carriage(self) -> Vector2:
+        """Where the carriage begins a drive, m."""
+        ...
+
+    @property
+    def start_hexapod(self) -> Vector3:
+        """Where the hexapod begins a drive, m from neutral."""
+        ...
+
+
+@dataclass(frozen=True)
+class Family:
+    """An algorithm of the washout kind, as kernels.
+
+    Args:
+        parameters: Kernel's struct of a parameter set.
+        memory: Kernel's struct of the filters' states.
+        values: (set, cab, time step in s) -> the kernel's form of a set.
+        predict: Kernel from observations, see :func:`~.kernels.predict_kernel`.
+        drive_through: Kernel fused with the machine, see :func:`~.kernels.drive_kernel`.
+    """
+
+    parameters: Any
+    memory: Any
+    values: Callable[[Any, Cab, float], Any]
+    predict: Any
+    drive_through: Any
+
+
+def make_family(
+    parameters: Any, memory: Any, begin: Any, step: Any, values: Callable[[Any, Cab, float], Any]
+) -> Family:
+    """A family of its structs, its first memory and its step; see :class:`Family`."""
+    return Family(
+        parameters,
+        memory,
+        values,
+        predict_kernel(parameters, memory, begin, step),
+        drive_kernel(parameters, begin, step),
+    )
+
+
+def start_pose(p: FamilyParameters) -> Array:
+    """(9,) pose to begin a drive at: C'(0) and S'(0)."""
+    pose = np.zeros(N_AXES)
+    pose[:2], pose[2:5] = p.start_carriage, p.start_hexapod
+    return pose
+
+
+# The classical washout's parameters as its kernels hold them.
+
+
+def _high_pass(block: HighPass) -> Any:
+    values: Any = HighPassParameters()
+    values.order, values.frequency, values.damping = block.order, block.frequency, block.damping
+    return values
+
+
+def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
+    """The kernels' form of a parameter set for a cab."""
+    k: Any = Parameters()
+    for name in ("force_scale", "force_limit", "rate_scale", "rate_limit"):
+        setattr(k, name, vec3(*getattr(p, name)))
+    blocks = {"hpr_roll": p.hpr[0], "hpr_pitch": p.hpr[1], "hpr_yaw": p.hpr[2], "hps_x": p.hps[0]}
+    blocks |= {"hps_y": p.hps[1], "hpi_x": p.hpi[0], "hpi_y": p.hpi[1], "hpi_z": p.hpi[2]}
+    for name, block in blocks.items():
+        setattr(k, name, _high_pass(block))
+    tilt = p.tilt or TiltCoordination()
+    k.tilt_gain = 1.0 if p.tilt else 0.0
+    k.tilt_frequency, k.tilt_damping = tilt.low_pass.frequency, tilt.low_pass.damping
+    k.tilt_rate, k.tilt_acceleration, k.tilt_approach = tilt.rate, tilt.acceleration, tilt.approach
+    lpc = p.lpc or LowPass(1.0)
+    k.carriage_share = 1.0 if p.lpc else 0.0
+    k.lpc_frequency, k.lpc_damping = lpc.frequency, lpc.damping
+    for name in (
+        "rate_bandwidth",
+        "turntable_share",
+        "turntable_gain",
+        "follow_frequency",
+        "return_frequency",
+    ):
+        setattr(k, name, getattr(p, name))
+    k.cab = vec3(*cab.reference_point)
+    return k
+
+
+def _values(p: WashoutParameters, cab: Cab, dt: float) -> Any:
+    return kernel_parameters(p, cab)
+
+
+CLASSICAL: Final[Family] = make_family(Parameters, Memory, initial_memory, washout, _values)
+"""The paper's algorithm."""
+
+# A washout as a policy; the classical one.
+
 
 P = TypeVar("P", bound=FamilyParameters)
 

@@ -10,14 +10,13 @@ import numpy as np
 import warp as wp
 
 from ...envs.errors import ActionError, ConfigurationError, DataError
-from ...envs.observation import OBSERVATION_SIZE
 from ...envs.platform.machines import Cab
-from ...envs.simulator import TIME_STEP
+from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
+from ...envs.simulator.simulator import TIME_STEP
 from ..policy import Array, checked_observation
-from .classical import kernel_parameters
+from .kernels.blocks import Parameters
 from .parameters import WashoutParameters
-from .policy import ClassicalWashout
-from .structs import Parameters
+from .policy import ClassicalWashout, kernel_parameters
 
 KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "cue_scale": ("force_scale", "rate_scale"),

@@ -11,15 +11,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from ..arrays import FLOAT, vec6
 from ..cues import CueTrace
 from ..errors import DataError
-from ..precision import FLOAT, vec6
-from .drive_kernel import COLUMNS, SUBSTEPS, Row, Task, drive_all, vec4
-from .driver import Driver, DriverParameters
-from .paths import Path, clothoids
-from .schedules import DT, Schedule
-from .unevenness import Unevenness, shaking
-from .vehicle_state import CarParameters
+from ..maneuvers.road_roughness import Unevenness, shaking
+from .kernels.driver import COLUMNS, SUBSTEPS, Driver, DriverParameters, Row, Task, drive_all, vec4
+from .kernels.vehicle import CarParameters
+from .plans import DT, Path, Schedule, clothoids
 from .vehicles import Car
 
 Floats = NDArray[np.float64]

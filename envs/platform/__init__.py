@@ -1,17 +1,11 @@
 """The motion base: carriage, hexapod, turntable, their limits and kinematics."""
 
-from .ablations import ablations
-from .actuators import ActuatorDynamics
 from .kinematics import legs_of_pose, pose_of_legs
 from .machines import Cab, Carriage, Hexapod, Platform, Turntable
 from .parameters import actuator_limits
-from .presets import ablation_names, get_platform, load_platform, platform_names
-from .state import ACTUATORS, AXES
+from .presets import ablation_names, ablations, get_platform, load_platform, platform_names
 
 __all__ = [
-    "ACTUATORS",
-    "AXES",
-    "ActuatorDynamics",
     "Cab",
     "Carriage",
     "Hexapod",

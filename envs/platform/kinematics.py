@@ -8,9 +8,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import FLOAT, vec3, vec6
 from ..errors import DataError, GeometryError
-from ..precision import FLOAT, vec3, vec6
-from .hexapod import HexapodGeometry, forward_kinematics, leg_extensions
+from .kernels.geometry import HexapodGeometry, forward_kinematics, leg_extensions
 from .machines import Hexapod
 from .parameters import geometry_of
 

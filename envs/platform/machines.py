@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ..errors import ConfigurationError
 from ..settings import Positive, Vector2, Vector3, configuration
-from .actuators import ActuatorDynamics
+from .kernels.step import ActuatorDynamics
 
 Joints = Annotated[tuple[Vector3, ...], Field(min_length=6, max_length=6)]
 UNITY = ActuatorDynamics()

@@ -1,12 +1,10 @@
-"""Machines by name: the paper's, and real ones for comparison.
-
-Figures marked (m) are class values or from the literature as remembered, not read off a data sheet.
-"""
+"""Machines with a subsystem locked: what does each of them buy?"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -14,9 +12,56 @@ import numpy as np
 
 from ..errors import GeometryError, UnknownNameError
 from ..settings import Vector3, load
-from .ablations import ablations
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
 from .parameters import check_geometry
+
+
+def _without_turntable(platform: Platform) -> Platform | None:
+    return platform.without_turntable() if platform.turntable else None
+
+
+def _without_carriage(platform: Platform) -> Platform | None:
+    return platform.without_carriage() if platform.carriage else None
+
+
+def _hexapod_only(platform: Platform) -> Platform | None:
+    if platform.turntable is None or platform.carriage is None:
+        return None
+    return platform.without_turntable().without_carriage()
+
+
+ABLATIONS: Final[Mapping[str, Callable[[Platform], Platform | None]]] = {
+    "no-turntable": _without_turntable,
+    "no-carriage": _without_carriage,
+    "hexapod-only": _hexapod_only,
+}
+"""What is left of a machine by the end of its name; None where it never had the subsystem."""
+
+_LEFT: Final = {
+    "no-turntable": "its turntable locked",
+    "no-carriage": "its carriage locked",
+    "hexapod-only": "turntable and carriage locked",
+}
+
+
+def ablations(platform: Platform) -> list[Platform]:
+    """The machine without turntable, without carriage and with the hexapod alone, as far as it has them.
+
+    The names are the machine's with -no-turntable, -no-carriage and -hexapod-only at the end.
+    """
+    found = []
+    for suffix, take in ABLATIONS.items():
+        left = take(platform)
+        if left is not None:
+            about = f"{platform.name} with {_LEFT[suffix]}"
+            found.append(replace(left, name=f"{platform.name}-{suffix}", description=about))
+    return found
+
+
+# Machines by name: the paper's, and real ones for comparison.
+#
+# Figures marked (m) are class values or from the literature as remembered, not read off a data sheet.
+
 
 _PAPER_UPPER: Final = (
     (1.5969, 0.1), (-0.7118, 1.4329), (-0.885, 1.3329), (-0.885, -1.3329), (-0.7118, -1.4329), (1.5969, -0.1),

@@ -1,10 +1,9 @@
 """Pictures of a machine in motion; they need the extra ``render``."""
 
-from .backend import RenderingUnavailableError
-from .cue_history import CueHistory
-from .from_state import append_state, motion_of
+from .drawing import RenderingUnavailableError
+from .instruments import CueHistory
 from .motion_view import MotionView
-from .renderer import FRAMES_PER_SECOND, Renderer
+from .renderer import FRAMES_PER_SECOND, Renderer, append_state, motion_of
 
 __all__ = [
     "FRAMES_PER_SECOND",

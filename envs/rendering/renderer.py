@@ -1,22 +1,188 @@
-"""Pictures of a machine in motion, beside the cues its driver should feel and does feel."""
+"""What a simulator's state says to a renderer."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cues import GRAVITY
 from ..errors import ConfigurationError
+from ..platform.kernels.step import CARRIAGE, LEGS, TURNTABLE
 from ..platform.machines import Platform
 from . import theme
-from .backend import load_pygame
-from .canvas import SUPERSAMPLING, Canvas
-from .cue_history import CueHistory
-from .motion_view import MotionView
-from .panel import PANEL_WIDTH, draw_panel
-from .scene import Arrows, Scene
+from .drawing import SUPERSAMPLING, Camera, Canvas, Mesh, Painter, load_pygame, orbit
+from .instruments import PANEL_WIDTH, CueHistory, draw_panel
+from .machine_model import Legs, MachineParts, machine_parts
+from .motion_view import (
+    Frame,
+    MotionView,
+    carriage_frame,
+    head,
+    joints,
+    leg_use,
+    neutral_view,
+    platform_frame,
+    turntable_frame,
+)
+from .surroundings import Shadow, grid_lines, shadow, travel_lines
+
+
+def motion_of(state: Any) -> MotionView:
+    """The pose in one row of :attr:`..simulator.Simulator.state`."""
+    motion = state["motion"]
+    position = motion["position"]
+    return MotionView(
+        carriage=position[CARRIAGE],
+        hexapod=np.concatenate([motion["displacement"], motion["beta"]]),
+        turntable=float(position[TURNTABLE]),
+        legs=position[LEGS],
+    )
+
+
+def append_state(history: CueHistory, time: float, state: Any) -> None:
+    """Add the cues in one row of :attr:`..simulator.Simulator.state` to a history."""
+    wanted, felt = (
+        np.concatenate([state[name]["force"], state[name]["rate"]]) for name in ("wanted", "felt")
+    )
+    history.append(time, wanted, felt)
+
+
+# The machine in its hall, in three dimensions.
+
+
+Floats = NDArray[np.float64]
+
+_AZIMUTH: Final = np.radians(-134.0)
+"""Where the camera stands: behind the machine, on its left."""
+_ELEVATION: Final = np.radians(17.0)
+_FIELD: Final = np.radians(30.0)
+"""Vertical angle of view."""
+_FOLLOW: Final = 0.93
+"""Share of the carriage's way the camera goes along; the rest is seen as motion across the picture."""
+_ARROW_LENGTH: Final = 1.1
+"""Of the arrow of one g, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrows:
+    """Specific force at the driver's head, in the axes of car and cab, m/s^2.
+
+    Args:
+        wanted: (3,) in the car.
+        felt: (3,) in the simulator.
+    """
+
+    wanted: Floats
+    felt: Floats
+
+
+class Scene:
+    """Draws a machine.
+
+    Args:
+        platform: The machine.
+        pygame: The module.
+    """
+
+    def __init__(self, platform: Platform, pygame: ModuleType) -> None:
+        self._platform, self._pygame = platform, pygame
+        self._parts: MachineParts = machine_parts(platform)
+        self._legs = Legs.of(platform.hexapod, self._parts.scale)
+        self._shadow: Shadow | None = None
+        self._grid = grid_lines(self._parts.floor)
+        self._top = (
+            platform.hexapod.neutral[2]
+            + platform.cab.reference_point[2]
+            + platform.cab.head[2]
+            - _ARROW_LENGTH
+        )
+
+    def camera(self, motion: MotionView, width: int, height: int) -> Camera:
+        """The camera that follows a machine, for a picture of a size in pixels."""
+        tall = self._parts.floor - self._top
+        middle = self._parts.floor - 0.5 * tall
+        target = np.array([*(_FOLLOW * motion.carriage), middle])
+        wide = max(1.0, 1.25 * height / width)
+        distance = wide * 1.3 * tall / (2.0 * np.tan(0.5 * _FIELD))
+        focal = 0.5 * height / np.tan(0.5 * _FIELD)
+        return orbit(target, distance, _AZIMUTH, _ELEVATION, focal, (0.5 * width, 0.5 * height))
+
+    def draw(self, surface: Any, motion: MotionView, arrows: Arrows | None = None) -> None:
+        """Draw a machine on a surface whose background is already there."""
+        camera = self.camera(motion, *surface.get_size())
+        reach = float(np.linalg.norm(camera.position - camera.target))
+        painter = Painter(self._pygame, surface, camera, (1.1 * reach, 3.4 * reach))
+        self._floor(painter, motion)
+        base = platform_frame(self._platform, motion)
+        groups = [self._below(motion), [placed(self._parts.platform, base)], self._above(camera, motion)]
+        # The platform's plane parts what is below from what is above: the far side first is exact.
+        above = (camera.position - base.origin) @ base.rotation[:, 2] < 0.0
+        painter.meshes(*(mesh for group in (groups if above else groups[::-1]) for mesh in group))
+        if arrows is not None:
+            self._arrows(painter, motion, arrows)
+
+    def _floor(self, painter: Painter, motion: MotionView) -> None:
+        unit = painter.surface.get_height() / 600.0
+        painter.lines(*self._grid, theme.GRID, unit)
+        carriage = self._platform.carriage
+        if carriage is not None:
+            painter.lines(
+                *travel_lines(carriage.travel_x, carriage.travel_y, self._parts.floor),
+                theme.TRAVEL,
+                2 * unit,
+            )
+        self._soft_shadow(painter, motion)
+        if self._parts.rails is not None and self._parts.bridge is not None:
+            painter.meshes(self._parts.rails, self._parts.bridge.moved((motion.carriage[0], 0.0, 0.0)))
+
+    def _soft_shadow(self, painter: Painter, motion: MotionView) -> None:
+        """The machine's shadow under a wide lamp: made once, as it lies in the middle, and moved along."""
+        size = painter.surface.get_size()
+        if self._shadow is None or self._shadow.size != size:
+            middle = self.camera(neutral_view(), *size)
+            self._shadow = shadow(self._pygame, middle, size, self._parts.scale, self._parts.floor)
+        target = painter.camera.target
+        points = np.array([[*motion.carriage, self._parts.floor], [*target[:2], self._parts.floor]])
+        here, there = painter.camera.project(points)
+        painter.surface.blit(
+            self._shadow.picture, np.round(self._shadow.corner + here - there).astype(int).tolist()
+        )
+
+    def _below(self, motion: MotionView) -> list[Mesh]:
+        """What lies under the platform, from the floor up."""
+        legs = self._legs.mesh(*joints(self._platform, motion), leg_use(self._platform, motion))
+        return [placed(self._parts.carriage, carriage_frame(motion)), legs]
+
+    def _above(self, camera: Camera, motion: MotionView) -> list[Mesh]:
+        """What stands on the platform, in the order in which it hides the rest."""
+        frame, cab = turntable_frame(self._platform, motion), self._parts.cab
+        deck = [part for part in (self._parts.turntable, self._parts.marks) if part is not None]
+        to_camera = (camera.position - frame(cab.driver)) @ frame.rotation
+        furniture = cab.furniture if to_camera[0] < 0.0 else cab.furniture[::-1]
+        shell = [] if cab.shell is None else [cab.shell]
+        wheels = cab.wheels[int(to_camera[1] > 0.0)]
+        return [placed(part, frame) for part in (*deck, *cab.inside, *furniture, *shell, *wheels)]
+
+    def _arrows(self, painter: Painter, motion: MotionView, arrows: Arrows) -> None:
+        """Specific force as arrows from the driver's head; one g is as long as an arm span."""
+        frame = turntable_frame(self._platform, motion)
+        start = head(self._platform, motion)
+        for force, colour in ((arrows.wanted, theme.WANTED), (arrows.felt, theme.FELT)):
+            tip = start + frame.rotation @ force * (_ARROW_LENGTH / GRAVITY)
+            painter.arrow(start, tip, colour)
+
+
+def placed(mesh: Mesh, frame: Frame) -> Mesh:
+    """A body's mesh in F_I."""
+    return replace(mesh, vertices=frame(mesh.vertices))
+
+
+# Pictures of a machine in motion, beside the cues its driver should feel and does feel.
+
 
 FRAMES_PER_SECOND: Final = 30
 """Rate at which a window shows frames, and films are made."""

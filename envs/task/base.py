@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConfigurationError
-from ..platform.state import AXES
-from ..snapshot import Snapshot
+from ..platform.kernels.step import AXES
+from ..simulator.simulator import Snapshot
 from .options import Mode
 
 Array = NDArray[Any]

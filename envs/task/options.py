@@ -8,15 +8,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..car import RandomDrives, maneuver_names, recording_names
-from ..cue_cost import CueCost
 from ..errors import UnknownNameError
+from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..perception.models import vestibular_model_names
-from ..platform.builds import BuildRanges
+from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, platform_names
-from ..platform.state import AXES
+from ..platform.randomization import BuildRanges
 from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
+from ..simulator.kernels.step import CueCost
 
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]

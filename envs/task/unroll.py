@@ -9,15 +9,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from ..arrays import real, vec9
 from ..errors import ConfigurationError
-from ..observation import OBSERVATION_SIZE
-from ..platform.state import SetPoint
-from ..precision import real, vec9
-from ..snapshot import Snapshot, bytes_of, put_bytes
-from ..state import State
+from ..platform.kernels.step import SetPoint
+from ..simulator.kernels.observation import OBSERVATION_SIZE
+from ..simulator.kernels.step import State
+from ..simulator.simulator import Snapshot, bytes_of, put_bytes
 from .batch import Batch
-from .reward_kernel import vec_terms
-from .unroll_kernels import look_with_adjoint, play_with_adjoint
+from .kernels.reward import vec_terms
+from .kernels.unroll import look_with_adjoint, play_with_adjoint
 
 _MODES: Final = ("acceleration", "jerk", "velocity")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -12,20 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..cues import CueTrace
 from ..errors import ConfigurationError
-from ..simulator import TIME_STEP
+from ..simulator.simulator import TIME_STEP
 from .batch import Batch
-from .environment import Picture, normalised
-from .options import TaskOptions
-from .reward_kernel import TERMS
-from .spaces import (
+from .environment import (
     RENDER_MODES,
     action_space,
     frames_per_second,
+    normalised,
     observation_space,
     pictures_of,
     rendered,
     task_options,
 )
+from .kernels.reward import TERMS
+from .options import TaskOptions
+
+if TYPE_CHECKING:
+    from ..rendering.renderer import Picture
 
 Mask = NDArray[np.bool_]
 Info = dict[str, Any]

@@ -1,5 +1,5 @@
 """Hours of random drives with other cars and slower actuators: what a policy must withstand."""
 
-from .options import NOMINAL, SLOWER, Endurance
+from .results import NOMINAL, SLOWER, Endurance
 
 __all__ = ["NOMINAL", "SLOWER", "Endurance"]

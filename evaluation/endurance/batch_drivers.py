@@ -13,10 +13,10 @@ from ...baselines.policy import ForeknowingPolicy, Policy, start_of
 from ...envs.cues import CueTrace
 from ...envs.perception import get_vestibular_model
 from ...envs.platform import Platform
-from ...envs.simulator import N_AXES, Simulator
+from ...envs.simulator.simulator import N_AXES, Simulator
 from ...envs.task.batch import Batch
-from ..drivers import Observer, TaskPolicy, deterministic
-from .options import Endurance
+from ..rollout import Observer, TaskPolicy, deterministic
+from .results import Endurance
 
 Floats = NDArray[np.float64]
 

@@ -1,16 +1,86 @@
-"""What a policy withstood, drive by drive and in all; as JSON and CSV."""
+"""What policies are put through: drives of all kinds in all cars, on machines of many actuators."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import hashlib
+import json
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from ...envs.settings import configuration
+from pydantic import Field
+
+from ...envs.car import car_names
+from ...envs.errors import DataError
+from ...envs.maneuvers import RandomDrives
+from ...envs.maneuvers.roads import KINDS
+from ...envs.platform import Platform
+from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
+from ...envs.simulator.simulator import TIME_STEP
+from ...envs.storage import write_text
+from ...envs.task import RandomisationOptions, TaskOptions
+from ...envs.task.drives import machines_of
+from ..provenance import package_version
+from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
+from ..results import save_rows
 from ..saved import Headed
-from ..spreadsheet import save_rows
-from .options import NOMINAL, SLOWER, Endurance
+
+NOMINAL: Final = "nominal"
+"""Name of the condition with the machine as it should be."""
+SLOWER: Final = "slower"
+"""Name of the condition with machines whose actuators have a lag and a dead time."""
+
+_EVENLY: Final[dict[str, Any]] = dict.fromkeys(KINDS, 1.0)
+_EVERY_KIND: Final = RandomDrives(**_EVENLY, roughness=(0.0, 600.0), cars=tuple(car_names()))
+
+
+@configuration
+class Endurance:
+    """Drives and machines; each drive is driven on the machine as it should be and on a slower one.
+
+    Lag and dead time reach to those of ``motion-cueing robustness``, both at once; 30 to 90 rad/s are 5 to
+    14 Hz, what motion bases are said to have (from memory).
+
+    Args:
+        drives: What drives are drawn from; default: every kind of road in every car, equally often,
+            smooth to rough.
+        duration: Of a drive, s.
+        friction: Range of a factor on the tires' friction.
+        natural_frequency: Range of the actuators' lag, rad/s, drawn for each subsystem of a machine.
+        dead_time: Range of their dead time, s, drawn alike.
+        machines: Slower machines that drives draw from.
+    """
+
+    drives: RandomDrives = _EVERY_KIND
+    duration: Positive = 120.0
+    friction: tuple[Positive, Positive] = (0.7, 1.0)
+    natural_frequency: tuple[Positive, Positive] = (30.0, 90.0)
+    dead_time: tuple[NonNegative, NonNegative] = (0.0, 0.05)
+    machines: Annotated[int, Field(ge=1)] = 64
+
+    def __post_init__(self) -> None:
+        # The ranges are those of an environment, which says what is wrong with them.
+        assert self.randomisation(SLOWER).machines == self.machines
+
+    def randomisation(self, condition: str) -> RandomisationOptions:
+        """What an environment draws under a condition."""
+        if condition == NOMINAL:
+            return RandomisationOptions()
+        return RandomisationOptions(
+            friction=self.friction,
+            natural_frequency=self.natural_frequency,
+            dead_time=self.dead_time,
+            machines=self.machines,
+        )
+
+    def machines_under(self, condition: str, platform: Platform) -> list[Platform]:
+        """The machines of a condition: the platform, or the slower ones, the same for every batch."""
+        return machines_of(TaskOptions(platform=platform, randomisation=self.randomisation(condition)))
+
+
+# What a policy withstood, drive by drive and in all; as JSON and CSV.
+
 
 SCHEMA: Final = 1
 """Version of ``endurance.json``."""
@@ -241,3 +311,142 @@ def _or_inf(value: float | None) -> float:
 
 def _ratio(over: float | None, under: float | None) -> float | None:
     return over / under if over is not None and under else None
+
+
+# Drives that are done, in files: one a policy. So a run that was stopped goes on, and can be made longer.
+
+
+FOLDER: Final = "drives"
+"""Within the folder of the results."""
+
+
+class EnduranceStore:
+    """Keeps the drives of one policy.
+
+    Args:
+        folder: Of the results.
+        policy: Label of the policy.
+        key: Of :func:`endurance_key`; drives of another key are not taken.
+        fresh: Remove what is kept.
+
+    Raises:
+        DataError: a file is damaged.
+    """
+
+    def __init__(self, folder: Path, policy: str, key: str, fresh: bool = False) -> None:
+        tag = hashlib.sha256(policy.encode()).hexdigest()[:6]
+        self._path = folder / FOLDER / f"{plain_name(policy)}-{tag}.json"
+        if fresh:
+            self._path.unlink(missing_ok=True)
+        self.kept = self._load(key)
+
+    def _load(self, key: str) -> PolicyEndurance:
+        try:
+            kept = from_dict(
+                PolicyEndurance, json.loads(self._path.read_text(encoding="utf-8")), str(self._path)
+            )
+        except FileNotFoundError:
+            return PolicyEndurance(key)
+        except OSError as error:
+            raise DataError(f"{self._path}: cannot be read ({error.strerror})") from None
+        except ValueError:
+            raise DataError(
+                f"{self._path}: damaged, not the drives of an endurance; delete it, or add --fresh"
+            ) from None
+        return kept if kept.key == key else PolicyEndurance(key)
+
+    def missing(self, seeds: Sequence[int]) -> list[int]:
+        """Those of the seeds whose drives are not done."""
+        done = {drive.seed for drive in self.kept.drives}
+        return [seed for seed in seeds if seed not in done]
+
+    def keep(self, drives: Collection[EnduredDrive], found: Mapping[str, dict[str, float]]) -> None:
+        """Write drives down at once, whole or not at all.
+
+        Args:
+            drives: That are done.
+            found: Extremes of them by condition.
+        """
+        before = self.kept
+        extremes = {
+            condition: before.extremes.get(condition, Extremes()).with_found(values)
+            for condition, values in found.items()
+        }
+        self.kept = PolicyEndurance(before.key, (*before.drives, *drives), extremes)
+        write_text(self._path, json.dumps(to_dict(self.kept), allow_nan=False) + "\n")
+
+
+def endurance_key(platform: Platform, endurance: Endurance, policy: Mapping[str, Any]) -> str:
+    """A hash of all that makes a policy's drives what they are, but their seeds.
+
+    Args:
+        platform: The machine.
+        endurance: What policies are put through.
+        policy: Of ``study_store.identity``.
+    """
+    whole = {
+        "version": package_version(),
+        "platform": to_dict(platform),
+        "endurance": to_dict(endurance),
+        "policy": dict(policy),
+    }
+    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
+
+
+# The tables of an endurance.
+
+
+_SHARES: Final = ("position", "rate", "acceleration")
+_ERRORS: Final = ("J", "J slower", "J ratio", "perceived J", "perceived ratio", "at limit %", "slower %")
+
+
+def tables(results: EnduranceResults) -> list[TextTable]:
+    """Safety, errors, and errors by kind of road, of every policy with a drive."""
+    return [_safety(results), _errors(results), _kinds(results)]
+
+
+def _safety(results: EnduranceResults) -> TextTable:
+    header = ("policy", "drives", "hours", "samples beyond a limit", "not finite", *_SHARES, "clearance")
+    rows = []
+    for name, found in results.summaries.items():
+        extremes = list(results.policies[name].extremes.values())
+        nearest = [max(getattr(one, what) for one in extremes) for what in _SHARES]
+        least = min(one.clearance for one in extremes)
+        cells = (f"{found.hours:.2f} × 2", f"{found.beyond}", f"{found.actions_not_finite}")
+        shares = tuple(f"{share:.4f}" for share in (*nearest, least))
+        rows.append((name, f"{found.drives}", *cells, *shares))
+    return TextTable("Limits: samples beyond them, largest use (1 is the limit)", header, tuple(rows))
+
+
+def _errors(results: EnduranceResults) -> TextTable:
+    rows = [
+        (name, *_error_cells(found), found.worst, number(found.worst_cue_error))
+        for name, found in results.summaries.items()
+    ]
+    title = "Cue errors, on the machine as it should be and on slower ones"
+    return TextTable(title, ("policy", *_ERRORS, "worst drive", "its J slower"), tuple(rows))
+
+
+def _kinds(results: EnduranceResults) -> TextTable:
+    rows = [
+        (name, kind, f"{len(drives)}", *_error_cells(summarised(drives, TIME_STEP)))
+        for name in results.summaries
+        for kind, drives in by_kind(results.policies[name].drives).items()
+    ]
+    return TextTable("By kind of road", ("policy", "kind", "drives", *_ERRORS), tuple(sorted(rows)))
+
+
+def _error_cells(found: EnduranceSummary) -> tuple[str, ...]:
+    return (
+        number(found.cue_error),
+        number(found.slower_cue_error),
+        _ratio_cell(found.ratio),
+        number(found.perceived_cue_error),
+        _ratio_cell(found.perceived_ratio),
+        percent(found.at_limit[NOMINAL]),
+        percent(found.at_limit[SLOWER]),
+    )
+
+
+def _ratio_cell(value: float | None) -> str:
+    return NOTHING if value is None else f"×{value:.2f}"

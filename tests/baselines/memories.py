@@ -8,8 +8,8 @@ import numpy as np
 
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.platform import Platform
-from motion_cueing.envs.simulator import Simulator
-from motion_cueing.evaluation.drivers import Observer
+from motion_cueing.envs.simulator.simulator import Simulator
+from motion_cueing.evaluation.rollout import Observer
 
 
 def memories(

@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from motion_cueing.baselines.washout.filters import HighPassParameters, high_pass, low_pass, moved
-from motion_cueing.baselines.washout.tilt import limited_tilt
-from motion_cueing.envs.precision import real, vec2, vec3
+from motion_cueing.baselines.washout.kernels.blocks import (
+    HighPassParameters,
+    high_pass,
+    limited_tilt,
+    low_pass,
+    moved,
+)
+from motion_cueing.envs.arrays import real, vec2, vec3
 
 DT = 0.01
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from motion_cueing.baselines.adaptive import (
+from motion_cueing.baselines.washout import ClassicalWashout, HighPass, WashoutParameters
+from motion_cueing.baselines.washout.adaptive import (
     Adaptation,
     AdaptiveParameters,
     AdaptiveWashout,
     adaptive_presets,
     load_adaptive,
 )
-from motion_cueing.baselines.adaptive.policy import ADAPTIVE
-from motion_cueing.baselines.washout import ClassicalWashout, HighPass, WashoutParameters
+from motion_cueing.baselines.washout.adaptive.policy import ADAPTIVE
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.platform import get_platform

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import pytest
 
-from motion_cueing.baselines import ForeknowingPolicy, ceiling, make_policy
-from motion_cueing.baselines.ceiling import CeilingWashout, ceiling_maneuvers, load_ceiling
+from motion_cueing.baselines import ForeknowingPolicy, make_policy
+from motion_cueing.baselines.washout import families as ceiling
 from motion_cueing.baselines.washout import load_washout
 from motion_cueing.baselines.washout.batch import WashoutBatch
-from motion_cueing.envs.car import get_maneuver, maneuver_names
+from motion_cueing.baselines.washout.families import CeilingWashout, ceiling_maneuvers, load_ceiling
 from motion_cueing.envs.errors import UnknownNameError
+from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import to_dict
 from motion_cueing.evaluation import measure, rollout

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import make_policy, policy_names
-from motion_cueing.baselines.families import (
+from motion_cueing.baselines.tuning.search import TuningOptions
+from motion_cueing.baselines.tuning.space import WashoutSpace
+from motion_cueing.baselines.washout.families import (
     ALGORITHMS,
     algorithm_of,
     family_presets,
@@ -16,8 +18,6 @@ from motion_cueing.baselines.families import (
     load_parameters,
     make_washout,
 )
-from motion_cueing.baselines.tuning.options import TuningOptions
-from motion_cueing.baselines.tuning.space import WashoutSpace
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import from_dict, save, to_dict

@@ -12,19 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg, signal
 
-from motion_cueing.baselines.optimal_washout import (
+from motion_cueing.baselines.tuning.space import WashoutSpace
+from motion_cueing.baselines.washout.batch import WashoutBatch
+from motion_cueing.baselines.washout.optimal import (
     OptimalParameters,
     OptimalWashout,
     PlaneWeights,
     load_optimal,
     optimal_presets,
 )
-from motion_cueing.baselines.optimal_washout.channels import heave, plane, yaw
-from motion_cueing.baselines.optimal_washout.design import design, discrete
-from motion_cueing.baselines.optimal_washout.policy import OPTIMAL
-from motion_cueing.baselines.optimal_washout.regulator import Problem, solve
-from motion_cueing.baselines.tuning.space import WashoutSpace
-from motion_cueing.baselines.washout.batch import WashoutBatch
+from motion_cueing.baselines.washout.optimal.design import Problem, design, discrete, heave, plane, solve, yaw
+from motion_cueing.baselines.washout.optimal.policy import OPTIMAL
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.perception import get_vestibular_model

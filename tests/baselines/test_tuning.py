@@ -10,20 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motion_cueing.baselines.tuning import evolution, method
+from motion_cueing.baselines.tuning import methods as evolution
+from motion_cueing.baselines.tuning import methods as method
 from motion_cueing.baselines.tuning import search as search_module
 from motion_cueing.baselines.tuning import space as space_module
-from motion_cueing.baselines.tuning.coordinates import COORDINATES, Coordinate
-from motion_cueing.baselines.tuning.descent import Descent, place_gradient
-from motion_cueing.baselines.tuning.evolution import Evolution
-from motion_cueing.baselines.tuning.method import Found
+from motion_cueing.baselines.tuning.methods import Descent, Evolution, Found, place_gradient
 from motion_cueing.baselines.tuning.objective import LIMIT_STEP, Objective, penalty
-from motion_cueing.baselines.tuning.options import TuningOptions
-from motion_cueing.baselines.tuning.search import Record, Search, load_record
-from motion_cueing.baselines.tuning.space import WashoutSpace
+from motion_cueing.baselines.tuning.search import Record, Search, TuningOptions, load_record
+from motion_cueing.baselines.tuning.space import COORDINATES, Coordinate, WashoutSpace
 from motion_cueing.baselines.washout import HighPass, load_washout, washout_presets
-from motion_cueing.envs.car import drive_seeds
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.train.config import TrainingConfig
 

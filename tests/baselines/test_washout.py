@@ -11,8 +11,6 @@ import yaml
 from scipy import signal
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy, make_policy
-from motion_cueing.baselines.families import family_presets
-from motion_cueing.baselines.optimal_washout import load_optimal
 from motion_cueing.baselines.washout import (
     HighPass,
     LowPass,
@@ -22,11 +20,13 @@ from motion_cueing.baselines.washout import (
     load_washout,
     washout_presets,
 )
-from motion_cueing.baselines.washout.step import Memory
+from motion_cueing.baselines.washout.families import family_presets
+from motion_cueing.baselines.washout.kernels.step import Memory
+from motion_cueing.baselines.washout.optimal import load_optimal
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import load, save, to_dict
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.evaluation import rollout
 
 from .drives import boundless, trace

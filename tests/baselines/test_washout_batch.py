@@ -18,7 +18,8 @@ from motion_cueing.baselines.washout import (
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.baselines.washout.parameters import WashoutParameters
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.envs.platform import ActuatorDynamics, get_platform
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.evaluation import measure, rollout
 
 from .drives import trace

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motion_cueing.envs.car.import_options import ImportOptions
-from motion_cueing.envs.car.importing import ImportedLog, import_log
-from motion_cueing.envs.car.log_timing import low_pass
-from motion_cueing.envs.car.mounting import Mounting, level
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
+from motion_cueing.envs.logs.columns import ImportOptions
+from motion_cueing.envs.logs.importer import ImportedLog, import_log
+from motion_cueing.envs.logs.mounting import Mounting, level
+from motion_cueing.envs.logs.timing import low_pass
 
 from .synthetic_log import COLUMNS, WITH_COURSE, Device, Floats, Truth, drive, rotation, write
 

@@ -5,14 +5,20 @@ import dataclasses
 import numpy as np
 import pytest
 
-from motion_cueing.envs.car import car_names, get_car, get_maneuver, maneuver_names
-from motion_cueing.envs.car.cone_maneuvers import DoubleLaneChange, ObstacleAvoidance, Slalom
-from motion_cueing.envs.car.corridors import Gate, clearance, smoothest_way
-from motion_cueing.envs.car.maneuver import DEGREE, KMH, LARGEST_OFFSET, Maneuver
-from motion_cueing.envs.car.paper_maneuvers import SteadyTurn
-from motion_cueing.envs.car.steering_tests import SineWithDwell
+from motion_cueing.envs.car import car_names, get_car
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
+from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
+from motion_cueing.envs.maneuvers.cones import (
+    DoubleLaneChange,
+    Gate,
+    ObstacleAvoidance,
+    Slalom,
+    clearance,
+    smoothest_way,
+)
+from motion_cueing.envs.maneuvers.maneuver import DEGREE, KMH, LARGEST_OFFSET, Maneuver
+from motion_cueing.envs.maneuvers.standard import SineWithDwell, SteadyTurn
 from motion_cueing.envs.settings import from_dict, load, save
 
 REST = np.array([0.0, 0.0, -GRAVITY])

@@ -6,10 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import fresnel
 
-from motion_cueing.envs.car.paths import STEP, Path, bend, clothoids, smooth_steps
-from motion_cueing.envs.car.schedules import DT, Change, Hold, Schedule
-from motion_cueing.envs.car.speed_planning import Style, along_path, speed_limit
+from motion_cueing.envs.car.plans import DT, STEP, Change, Hold, Path, Schedule, bend, clothoids, smooth_steps
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.maneuvers.roads import Style, along_path, speed_limit
 
 
 @given(st.floats(-0.08, 0.08))

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motion_cueing.envs.car import RandomDrives, drive_seeds, get_car, random_drive, random_drives
+from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
+from motion_cueing.envs.maneuvers import RandomDrives, drive_seeds, random_drive, random_drives
 
 ROADS = ("urban", "rural", "highway")
 KINDS = (*ROADS, "track", "hilly", "strip", "cones")

@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import csd, welch
 
-from motion_cueing.envs.car import RandomDrives, get_car, random_drive, random_drives
-from motion_cueing.envs.car.unevenness import SPACING, Unevenness, _sprung, shaking
+from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.envs.maneuvers import RandomDrives, random_drive, random_drives
+from motion_cueing.envs.maneuvers.road_roughness import SPACING, Unevenness, _sprung, shaking
 from motion_cueing.envs.settings import from_dict
 
 CAR = get_car("sedan")

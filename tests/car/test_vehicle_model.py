@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motion_cueing.envs.car import car_names, get_car
-from motion_cueing.envs.car.driver import Driver
-from motion_cueing.envs.car.paths import Path
-from motion_cueing.envs.car.schedules import Change, Hold, Schedule
+from motion_cueing.envs.car.kernels.driver import Driver
+from motion_cueing.envs.car.plans import Change, Hold, Path, Schedule
 from motion_cueing.envs.car.simulation import Plan, simulate, straight
 from motion_cueing.envs.car.vehicles import Car
 from motion_cueing.envs.cues import GRAVITY

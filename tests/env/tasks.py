@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from motion_cueing.baselines.washout import ClassicalWashout, ScheduledWashout
-from motion_cueing.envs.car import RandomDrives
 from motion_cueing.envs.cues import CueTrace
-from motion_cueing.envs.platform.builds import BuildRanges
+from motion_cueing.envs.maneuvers import RandomDrives
+from motion_cueing.envs.platform.randomization import BuildRanges
 from motion_cueing.envs.task import (
     ActionOptions,
     EpisodeOptions,

@@ -8,10 +8,10 @@ from __future__ import annotations
 import pytest
 import warp as wp
 
-from motion_cueing.envs.platform.state import Machine
-from motion_cueing.envs.precision import vec9
-from motion_cueing.envs.state import State
-from motion_cueing.envs.task.kernels import Arrays, Rules, commanded, forget, judge, look
+from motion_cueing.envs.arrays import vec9
+from motion_cueing.envs.platform.kernels.step import Machine
+from motion_cueing.envs.simulator.kernels.step import State
+from motion_cueing.envs.task.kernels.episode import Arrays, Rules, commanded, forget, judge, look
 
 
 @wp.kernel(enable_backward=False, module="unique")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from motion_cueing.envs.car import RandomDrives, drive_seeds, get_maneuver, get_recording, random_drive
 from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.envs.maneuvers import RandomDrives, drive_seeds, get_maneuver, get_recording, random_drive
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.platform.kinematics import legs_of_pose
 from motion_cueing.envs.task import (
@@ -16,8 +16,8 @@ from motion_cueing.envs.task import (
     RandomisationOptions,
 )
 from motion_cueing.envs.task.draws import key_of, uniform, words
-from motion_cueing.envs.task.episode import draw, pose_scale, start_poses
-from motion_cueing.envs.task.library import library_of
+from motion_cueing.envs.task.drives import library_of
+from motion_cueing.envs.task.kernels.observation import draw, pose_scale, start_poses
 
 from .tasks import drive
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines.washout import ClassicalWashout
-from motion_cueing.envs.observation import ROWS, SLICES
+from motion_cueing.envs.simulator.kernels.observation import ROWS, SLICES
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomisationOptions
-from motion_cueing.envs.task.layout import (
+from motion_cueing.envs.task.observation import (
     BASE,
     COMMAND,
     DIFFERENCE,

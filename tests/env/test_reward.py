@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions, RewardOptions, RewardWeights
-from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.evaluation import signals
-from motion_cueing.evaluation.criteria import Criteria
+from motion_cueing.evaluation.metrics import Criteria
 
 from .tasks import drive
 

@@ -7,7 +7,7 @@ import pytest
 
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.spaces import task_options
+from motion_cueing.envs.task.environment import task_options
 
 from .tasks import EVERY_OPTION, options
 

@@ -7,8 +7,8 @@ import pytest
 
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
-from motion_cueing.envs.platform.builds import BuildRanges
-from motion_cueing.envs.platform.reach import axis_reach
+from motion_cueing.envs.platform.parameters import axis_reach
+from motion_cueing.envs.platform.randomization import BuildRanges
 from motion_cueing.envs.task import (
     DrivingSimulator,
     DrivingSimulatorVector,
@@ -16,8 +16,7 @@ from motion_cueing.envs.task import (
     TaskOptions,
 )
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.layout import MACHINE
-from motion_cueing.envs.task.scaling import acceleration_scale, velocity_scale
+from motion_cueing.envs.task.observation import MACHINE, acceleration_scale, velocity_scale
 from motion_cueing.envs.task.unroll import TaskUnroll
 
 from .tasks import drive

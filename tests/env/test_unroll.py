@@ -8,7 +8,7 @@ import pytest
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.envs.task.unroll import TaskUnroll
 
 from .tasks import drive

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import ClassicalWashout
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import Trajectory, policies, rollout
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.train.agent import shipped
+from motion_cueing.train.agents import agent as shipped
 
 from ..env.tasks import drive
 from ..train.agents import agent

@@ -16,17 +16,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motion_cueing.baselines.washout import load_washout
+from motion_cueing.cli import evaluate as evaluate_command
+from motion_cueing.cli.__main__ import with_default
+from motion_cueing.cli.evaluate import EvaluateCommand, command_line
+from motion_cueing.cli.main import COMMANDS, main
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import MotionCueingError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import save, to_dict
-from motion_cueing.evaluation import evaluate_command
-from motion_cueing.evaluation.__main__ import with_default
-from motion_cueing.evaluation.command_line import COMMANDS, main
-from motion_cueing.evaluation.evaluate_command import EvaluateCommand, command_line
-from motion_cueing.evaluation.file_names import file_names
 from motion_cueing.evaluation.policies import policy_names
+from motion_cueing.evaluation.reporting.text import file_names
 from motion_cueing.evaluation.results import Results
 from motion_cueing.evaluation.selection import find_maneuvers, find_policies
 from motion_cueing.evaluation.suite import labels
@@ -140,7 +140,7 @@ PRESSED = """
 import sys
 class Pressed:
     def find_spec(self, name, path=None, target=None):
-        if name == "motion_cueing.evaluation.criteria":
+        if name == "motion_cueing.evaluation.metrics":
             raise KeyboardInterrupt
 sys.meta_path.insert(0, Pressed())
 sys.argv[0] = sys.argv[1]
@@ -186,7 +186,7 @@ def test_where_nothing_can_be_written_is_told_before_the_work(name, tmp_path, mo
     below = f"afile/{FILES.get(name, 'deep')}"
     assert "afile is a file; name a folder" in complaint(capsys, [name, *WRITE[name], option, below])
     with monkeypatch.context() as locked:
-        locked.setattr("motion_cueing.envs.targets.probe", denied)
+        locked.setattr("motion_cueing.envs.storage.probe", denied)
         there = FILES.get(name, "deep")
         said = complaint(capsys, [name, *WRITE[name], option, there])
         assert f"{option} {there} cannot be written (Permission denied); name another folder" in said
@@ -443,7 +443,7 @@ def test_the_recorded_command_gives_the_same_command():
 
 def test_help_and_evaluate_do_not_import_torch():
     script = (
-        "import sys; from motion_cueing.evaluation.command_line import main; "
+        "import sys; from motion_cueing.cli.main import main; "
         "main(['evaluate', '--help']); sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", script], capture_output=True).returncode == 0

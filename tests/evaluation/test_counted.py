@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from rich.console import Console
 
-from motion_cueing.evaluation.counted import trouble_lines
-from motion_cueing.evaluation.tables import print_results
+from motion_cueing.evaluation.reporting.tables import print_results
+from motion_cueing.evaluation.suite import trouble_lines
 
 from .test_ladder import GAINS, results_of
 

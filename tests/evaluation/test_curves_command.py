@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.curves_command import grouped, read_curve
+from motion_cueing.cli.curves import grouped, read_curve
+from motion_cueing.cli.main import main
 
 
 @pytest.fixture

@@ -8,19 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motion_cueing.baselines import ClassicalWashout, NoMotion, ceiling
-from motion_cueing.baselines.ceiling import load_ceiling
-from motion_cueing.envs.car import get_car, get_maneuver
+from motion_cueing.baselines import ClassicalWashout, NoMotion
+from motion_cueing.baselines.washout import families as ceiling
+from motion_cueing.baselines.washout.families import load_ceiling
+from motion_cueing.cli.main import main
+from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError
-from motion_cueing.envs.observation import read
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import save
+from motion_cueing.envs.simulator.kernels.observation import read
 from motion_cueing.evaluation import measure, rollout
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.demonstration import Demonstrator, demonstrate
-from motion_cueing.train.demonstrations import Demonstration, load_demonstrations, load_index
+from motion_cueing.evaluation.demonstrations import Demonstrator, demonstrate
+from motion_cueing.train.algorithms.dagger.demonstrations import (
+    Demonstration,
+    load_demonstrations,
+    load_index,
+)
 
 from ..optimum.drives import surge
 

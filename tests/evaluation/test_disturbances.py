@@ -7,10 +7,10 @@ import pytest
 
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.evaluation import disturbances
-from motion_cueing.evaluation.disturbances import Disturbances, Study, fiercer
 from motion_cueing.evaluation.rollout import rollout
-from motion_cueing.evaluation.study_store import drive_key
+from motion_cueing.evaluation.studies import disturbances
+from motion_cueing.evaluation.studies.disturbances import Disturbances, Study, fiercer
+from motion_cueing.evaluation.studies.store import drive_key
 
 from .studies import PAPER, SEDAN, bend
 

@@ -9,9 +9,9 @@ from motion_cueing.baselines import NoMotion
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.platform import ablation_names, ablations, get_platform, platform_names
 from motion_cueing.envs.task import TaskOptions
-from motion_cueing.evaluation.fitting import moved_to, policy_on
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.evaluation.rollout import rollout
+from motion_cueing.evaluation.studies.study import moved_to, policy_on
 
 from .studies import PAPER, bend
 

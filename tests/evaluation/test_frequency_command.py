@@ -7,12 +7,12 @@ import csv
 import numpy as np
 import pytest
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError, DataError
-from motion_cueing.evaluation import frequency_figure, policies
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.frequency_probe import FrequencyTest
-from motion_cueing.evaluation.frequency_response import FrequencyResponse, Sinusoid
-from motion_cueing.evaluation.frequency_tables import amplitudes, load_json, response_table
+from motion_cueing.evaluation import policies
+from motion_cueing.evaluation.frequency_response import reporting as frequency_figure
+from motion_cueing.evaluation.frequency_response.reporting import amplitudes, load_json, response_table
+from motion_cueing.evaluation.frequency_response.response import FrequencyResponse, FrequencyTest, Sinusoid
 from motion_cueing.evaluation.metrics import CUE_AXES
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.evaluation.frequency_probe import (
+from motion_cueing.evaluation.frequency_response.response import (
     OMCT_FREQUENCIES,
     FrequencyTest,
     harmonic,

@@ -17,9 +17,8 @@ from motion_cueing.baselines.washout.parameters import (
     WashoutParameters,
 )
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation.frequency_probe import FrequencyTest
-from motion_cueing.evaluation.frequency_response import frequency_response
-from motion_cueing.evaluation.frequency_tables import response_table
+from motion_cueing.evaluation.frequency_response.reporting import response_table
+from motion_cueing.evaluation.frequency_response.response import FrequencyTest, frequency_response
 from motion_cueing.evaluation.metrics import CUE_AXES
 from motion_cueing.evaluation.policies import make_policy
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import tyro
 
+from motion_cueing.cli.import_log import ImportCommand, run
+from motion_cueing.cli.main import main
 from motion_cueing.envs import CueTrace
-from motion_cueing.envs.car.log_columns import parse_columns
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.import_command import ImportCommand, run
+from motion_cueing.envs.logs.columns import parse_columns
 
 from ..car.synthetic_log import COLUMNS, Device, drive, write
 
@@ -151,7 +151,7 @@ def test_a_folder_without_permission_is_refused_first(
             raise PermissionError(13, "Permission denied", str(folder / "tmpname"))
 
     (tmp_path / "locked").mkdir()
-    monkeypatch.setattr("motion_cueing.envs.targets.probe", denied)
+    monkeypatch.setattr("motion_cueing.envs.storage.probe", denied)
     arguments = [str(log), "--column", *TEXTS, "--out", str(tmp_path / "cues.csv")]
     with pytest.raises(DataError, match=r"--plot .*locked/plot.png cannot be written \(Permission"):
         run(parsed(*arguments, "--plot", str(tmp_path / "locked" / "plot.png")))

@@ -10,20 +10,32 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motion_cueing.evaluation.criteria import Criteria, References
-from motion_cueing.evaluation.figure_style import line_styles, new_figure
-from motion_cueing.evaluation.figures import _error, _spread, maneuver_figure, shown_policies
-from motion_cueing.evaluation.ladder import ALL_RUNGS, LADDER, ladder_names, rungs
-from motion_cueing.evaluation.ladder_figure import _errors, ladder_figure
-from motion_cueing.evaluation.ladder_table import ladder_table, save_ladder
-from motion_cueing.evaluation.metrics import measure
+from motion_cueing.evaluation.benchmark import (
+    ALL_RUNGS,
+    LADDER,
+    ladder_names,
+    ladder_table,
+    rungs,
+    save_ladder,
+)
+from motion_cueing.evaluation.comparison import Share, gap_share, shares
+from motion_cueing.evaluation.metrics import Criteria, References, measure
 from motion_cueing.evaluation.policies import policy_names
-from motion_cueing.evaluation.report import render
+from motion_cueing.evaluation.reporting.figures import (
+    _error,
+    _errors,
+    _spread,
+    ladder_figure,
+    line_styles,
+    maneuver_figure,
+    new_figure,
+    shown_policies,
+)
+from motion_cueing.evaluation.reporting.report import render
+from motion_cueing.evaluation.reporting.tables import maneuver_table, share_table, standings_table
+from motion_cueing.evaluation.reporting.text import number
 from motion_cueing.evaluation.results import Failure, Provenance, Results
 from motion_cueing.evaluation.selection import find_platform, find_policies
-from motion_cueing.evaluation.share import Share, gap_share, shares
-from motion_cueing.evaluation.tables import maneuver_table, share_table, standings_table
-from motion_cueing.evaluation.text_table import number
 
 from .synthetic import drive
 

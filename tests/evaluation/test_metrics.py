@@ -8,10 +8,9 @@ from math import radians
 import numpy as np
 import pytest
 
-from motion_cueing.envs.platform import ACTUATORS
+from motion_cueing.envs.platform.kernels import ACTUATORS
 from motion_cueing.envs.settings import from_dict, to_dict
-from motion_cueing.evaluation.criteria import Criteria
-from motion_cueing.evaluation.metrics import CUE_AXES, Metrics, measure
+from motion_cueing.evaluation.metrics import CUE_AXES, Criteria, Metrics, measure
 
 from .synthetic import GRAVITY, drive, trajectory
 

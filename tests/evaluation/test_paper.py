@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.paper import CASES, drive_cases
-from motion_cueing.evaluation.paper_checks import Check, all_checks, within_limits
+from motion_cueing.cli.main import main
+from motion_cueing.evaluation.paper.cases import CASES, drive_cases
+from motion_cueing.evaluation.paper.statements import Check, all_checks, within_limits
 from motion_cueing.evaluation.trajectory import Trajectory
 
 

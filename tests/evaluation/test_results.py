@@ -10,13 +10,13 @@ import struct
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
-from motion_cueing.evaluation.figures import maneuver_figure
 from motion_cueing.evaluation.metrics import CUE_AXES, measure
 from motion_cueing.evaluation.provenance import plain, provenance
-from motion_cueing.evaluation.report import render
+from motion_cueing.evaluation.reporting.figures import maneuver_figure
+from motion_cueing.evaluation.reporting.report import render
+from motion_cueing.evaluation.reporting.tables import maneuver_table
+from motion_cueing.evaluation.reporting.text import number
 from motion_cueing.evaluation.results import SCHEMA, Failure, Results
-from motion_cueing.evaluation.tables import maneuver_table
-from motion_cueing.evaluation.text_table import number
 
 from .synthetic import drive
 

@@ -9,11 +9,11 @@ import pytest
 
 from motion_cueing.baselines import ClassicalWashout
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.envs.observation import OBSERVATION_SIZE, read
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE, read
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.evaluation.rollout import rollout
-from motion_cueing.evaluation.sensor_noise import SensorNoise, with_noise
-from motion_cueing.train.agent import Agent
+from motion_cueing.evaluation.studies.disturbances import SensorNoise, with_noise
+from motion_cueing.train.agents import Agent
 
 from .studies import PAPER, bend
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.car import get_maneuver, maneuver_names
+from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.platform.actuators import ActuatorDynamics
+from motion_cueing.envs.platform.kernels.step import ActuatorDynamics
 from motion_cueing.evaluation import Metrics, Trajectory, measure, rollout
-from motion_cueing.evaluation.disturbances import with_dynamics
-from motion_cueing.train.agent import Agent, agent_names, get_agent
+from motion_cueing.evaluation.studies.disturbances import with_dynamics
+from motion_cueing.train.agents import Agent, agent_names, get_agent
 
 WASHOUTS = ("classical", "classical-tuned")
 """The better one by hand, and the better one on the roads that agents are trained on."""

@@ -10,20 +10,25 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from motion_cueing.baselines import ceiling
-from motion_cueing.baselines.ceiling import CeilingWashout, load_ceiling
+from motion_cueing.baselines.washout import families as ceiling
 from motion_cueing.baselines.washout import load_washout
+from motion_cueing.baselines.washout.families import CeilingWashout, load_ceiling
+from motion_cueing.cli.studies import results_of
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation import study as study_module
-from motion_cueing.evaluation import study_figures
-from motion_cueing.evaluation.study import Condition, run_study
-from motion_cueing.evaluation.study_command import results_of
-from motion_cueing.evaluation.study_figures import heat_figure, lines_figure
-from motion_cueing.evaluation.study_results import StudyResults
-from motion_cueing.evaluation.study_store import identity
-from motion_cueing.evaluation.study_tables import condition_table, matrix_table, print_study, share_tables
+from motion_cueing.evaluation.studies import figures as study_figures
+from motion_cueing.evaluation.studies import study as study_module
+from motion_cueing.evaluation.studies.figures import heat_figure, lines_figure
+from motion_cueing.evaluation.studies.results import (
+    StudyResults,
+    condition_table,
+    matrix_table,
+    print_study,
+    share_tables,
+)
+from motion_cueing.evaluation.studies.store import identity
+from motion_cueing.evaluation.studies.study import Condition, run_study
 
 from .studies import PAPER, SEDAN, bend
 from .synthetic import drive

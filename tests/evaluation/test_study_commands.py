@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.platform import ablations, get_platform
 from motion_cueing.envs.settings import save
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.study_results import StudyResults
+from motion_cueing.evaluation.studies.results import StudyResults
 
 from .studies import PAPER, bend
 

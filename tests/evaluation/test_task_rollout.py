@@ -10,9 +10,9 @@ import pytest
 from motion_cueing.baselines import ClassicalWashout
 from motion_cueing.baselines.washout import ScheduledWashout
 from motion_cueing.envs.errors import ActionError, ConfigurationError
-from motion_cueing.envs.observation import OBSERVATION_SIZE, read
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE, read
 from motion_cueing.envs.task import (
     ActionOptions,
     EpisodeOptions,
@@ -21,8 +21,7 @@ from motion_cueing.envs.task import (
     TaskOptions,
 )
 from motion_cueing.envs.task.environment import normalised
-from motion_cueing.envs.task.layout import layout_of
-from motion_cueing.envs.task.scaling import acceleration_scale
+from motion_cueing.envs.task.observation import acceleration_scale, layout_of
 from motion_cueing.evaluation import Trajectory, rollout
 
 from ..env.tasks import drive

@@ -10,16 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from motion_cueing.evaluation.text_table import (
+from motion_cueing.evaluation.reporting.text import (
     NOTHING,
     TextTable,
+    how_many,
     markdown,
     number,
     print_table,
     save_markdown,
     table_console,
 )
-from motion_cueing.evaluation.words import how_many
 
 HEADER = ("policy", "J", "tilt rate above 3 deg/s %", *(f"step mean µs {i}" for i in range(12)), "max µs")
 ROWS = tuple(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import ablation_names, get_platform, platform_names
 from motion_cueing.envs.task import DrivingSimulator, TaskOptions
 from motion_cueing.evaluation import policies, rollout
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.loop.machine import make_machine
-from motion_cueing.evaluation.own_machine import on_machine
-from motion_cueing.train.agent import shipped
+from motion_cueing.evaluation.rollout import on_machine
+from motion_cueing.realtime.machine import make_machine
+from motion_cueing.train.agents import agent as shipped
 
 from ..env.tasks import drive
 from ..train.agents import agent

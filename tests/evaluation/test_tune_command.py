@@ -11,17 +11,15 @@ import pytest
 from rich.console import Console
 
 from motion_cueing.baselines import make_policy
-from motion_cueing.baselines.families import algorithm_of, load_parameters
-from motion_cueing.baselines.tuning.options import TuningOptions
-from motion_cueing.baselines.tuning.search import Status, load_record
+from motion_cueing.baselines.tuning.search import Status, TuningOptions, load_record
 from motion_cueing.baselines.washout import load_washout
-from motion_cueing.envs.car import random_drives
+from motion_cueing.baselines.washout.families import algorithm_of, load_parameters
+from motion_cueing.cli import tune as tune_command
+from motion_cueing.cli.main import main
+from motion_cueing.cli.tune import TuningProgress, _spared
+from motion_cueing.envs.maneuvers import random_drives
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation import tune_command
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.tune_command import _spared
-from motion_cueing.evaluation.tune_progress import TuningProgress
-from motion_cueing.train.interrupt import Interrupt
+from motion_cueing.train.training import Interrupt
 
 from ..baselines.drives import trace
 

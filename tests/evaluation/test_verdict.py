@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from motion_cueing.evaluation.comparison import advantage, judge, judge_suite, terms
 from motion_cueing.evaluation.metrics import measure
-from motion_cueing.evaluation.verdict import advantage, judge, judge_suite, terms
 
 from .synthetic import GRAVITY, drive, trajectory
 

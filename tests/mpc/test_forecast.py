@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines.mpc import Forecast
-from motion_cueing.baselines.mpc.forecast import REST, Forecaster
-from motion_cueing.baselines.mpc.grid import make_grid
+from motion_cueing.baselines.mpc.prediction import REST, Forecaster, make_grid
 from motion_cueing.envs.cues import CueTrace
 
 NODES = (0.01, 0.1, 0.4, 1.0)

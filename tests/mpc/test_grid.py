@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motion_cueing.baselines.mpc.grid import make_grid
+from motion_cueing.baselines.mpc.prediction import make_grid
 
 NODES = (0.01, 0.04, 0.1, 0.3, 0.35, 1.0)
 

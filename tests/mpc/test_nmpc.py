@@ -6,14 +6,13 @@ import casadi as cs
 import numpy as np
 import pytest
 
-from motion_cueing.baselines.mpc import Margins
-from motion_cueing.baselines.mpc import compiled as compiled_module
-from motion_cueing.baselines.mpc import planner as planner_module
-from motion_cueing.baselines.mpc.compiled import compiled
-from motion_cueing.baselines.mpc.linearisation import N_CUES, Linearised
-from motion_cueing.baselines.mpc.planner import Planned, Planner
-from motion_cueing.baselines.nmpc import NmpcParameters, make_nmpc
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.baselines import symbolic as compiled_module
+from motion_cueing.baselines.mpc import Margins, NmpcParameters, make_nmpc
+from motion_cueing.baselines.mpc import solver as planner_module
+from motion_cueing.baselines.mpc.prediction import N_CUES, Linearised
+from motion_cueing.baselines.mpc.solver import Planned, Planner
+from motion_cueing.baselines.symbolic import compiled
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.evaluation import measure, rollout
 
 from .machines import NODES, PAPER, quick

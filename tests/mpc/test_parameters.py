@@ -7,9 +7,16 @@ import sys
 
 import pytest
 
-from motion_cueing.baselines.mpc import Forecast, Margins, MpcParameters, load_mpc, mpc_presets, solver
-from motion_cueing.baselines.nmpc import NmpcParameters
-from motion_cueing.baselines.symbolic import library
+from motion_cueing.baselines import symbolic as library
+from motion_cueing.baselines.mpc import (
+    Forecast,
+    Margins,
+    MpcParameters,
+    NmpcParameters,
+    load_mpc,
+    mpc_presets,
+    solver,
+)
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.settings import load, save
 

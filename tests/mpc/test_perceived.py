@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from motion_cueing.baselines.mpc.grid import make_grid
-from motion_cueing.baselines.mpc.linearisation import cue_scales
-from motion_cueing.baselines.mpc.perceived import Perception
+from motion_cueing.baselines.mpc.prediction import Perception, cue_scales, make_grid
 from motion_cueing.envs.perception import get_vestibular_model
 
 from .machines import quick

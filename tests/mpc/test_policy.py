@@ -7,18 +7,17 @@ import pytest
 from scipy.optimize import brentq
 
 from motion_cueing.baselines import ForeknowingPolicy, make_policy, policy_names
-from motion_cueing.baselines.mpc import MpcParameters, TiltRate, make_mpc
+from motion_cueing.baselines.mpc import MpcParameters, NmpcParameters, TiltRate, make_mpc
 from motion_cueing.baselines.mpc import solver as solver_module
-from motion_cueing.baselines.mpc.braking import Brakes
-from motion_cueing.baselines.mpc.grid import make_grid
-from motion_cueing.baselines.nmpc import NmpcParameters
-from motion_cueing.envs.car import get_maneuver
+from motion_cueing.baselines.mpc.policy import Brakes
+from motion_cueing.baselines.mpc.prediction import make_grid
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError
-from motion_cueing.envs.observation import OBSERVATION_SIZE
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import save
-from motion_cueing.envs.simulator import TIME_STEP, Simulator
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
+from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.trajectory import Trajectory
 
@@ -150,7 +149,7 @@ def test_no_plan_means_braking_to_a_stop_within_limits(monkeypatch):
             return real(problem, *arguments)
         return solver_module._unsolved(problem, np.zeros(0, dtype=np.intp))
 
-    monkeypatch.setattr("motion_cueing.baselines.mpc.planner.solve", failing)
+    monkeypatch.setattr("motion_cueing.baselines.mpc.solver.solve", failing)
     trajectory = driven(part("slalom", 5.0, 3.5, fierce=1.5), preview=1.0)
     assert trajectory.metadata["mpc_failures"] == str(len(calls) - 100)
     assert len(calls) > 150

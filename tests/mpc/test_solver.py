@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from motion_cueing.baselines.mpc import solver as solver_module
-from motion_cueing.baselines.mpc.grid import make_grid
-from motion_cueing.baselines.mpc.linearisation import N_CUES, Linearisation, cue_scales
+from motion_cueing.baselines.mpc.prediction import N_CUES, Linearisation, cue_scales, make_grid
 from motion_cueing.baselines.mpc.problem import Bounds, Plan, Problem
 from motion_cueing.baselines.mpc.solver import Solution, solve
 

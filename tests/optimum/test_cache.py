@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motion_cueing.baselines.cache import cache_folder
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
-from motion_cueing.baselines.optimum.cache import find, keep, key_of, plans_folder
-from motion_cueing.baselines.optimum.plan import Account, Plan
+from motion_cueing.baselines.optimum.plan import Account, Plan, find, keep, key_of, plans_folder
 from motion_cueing.baselines.optimum.windows import Planner
+from motion_cueing.baselines.presets import cache_folder
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
 

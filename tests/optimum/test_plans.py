@@ -13,15 +13,14 @@ from hypothesis import strategies as st
 
 from motion_cueing.baselines import ClassicalWashout, make_policy
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
-from motion_cueing.baselines.optimum.problem import Problem
-from motion_cueing.baselines.optimum.windows import Planner, windows
+from motion_cueing.baselines.optimum.windows import Planner, Problem, windows
 from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError
-from motion_cueing.envs.observation import OBSERVATION_SIZE
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
+from motion_cueing.envs.simulator.simulator import Simulator
 from motion_cueing.evaluation import measure, rollout
 
 from .drives import DT, gentle, hard_braking, surge, turning, weaving

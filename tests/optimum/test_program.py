@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from motion_cueing.baselines.optimum.blocks import blocks_of
-from motion_cueing.baselines.optimum.interval import interval, mean_accelerations
-from motion_cueing.baselines.optimum.limits import node_limits
-from motion_cueing.baselines.optimum.listener import Watch
-from motion_cueing.baselines.optimum.options import OptimumOptions
-from motion_cueing.baselines.optimum.perception import sensed_error
-from motion_cueing.baselines.optimum.transcription import Transcription
+from motion_cueing.baselines.optimum.program import (
+    OptimumOptions,
+    interval,
+    mean_accelerations,
+    node_limits,
+    sensed_error,
+)
+from motion_cueing.baselines.optimum.transcription import Transcription, Watch, blocks_of
 from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.perception import get_vestibular_model, vestibular_model_names
 from motion_cueing.envs.platform import get_platform

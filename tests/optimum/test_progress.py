@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
-from motion_cueing.baselines.optimum import progress as module
-from motion_cueing.baselines.optimum.progress import SolveProgress
+from motion_cueing.baselines.optimum import policy as module
+from motion_cueing.baselines.optimum.policy import SolveProgress
 
 from .drives import surge
 

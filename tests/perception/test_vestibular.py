@@ -12,7 +12,7 @@ from motion_cueing.envs.perception import get_vestibular_model, vestibular_model
 from motion_cueing.envs.perception.models import discretise
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import from_dict, to_dict
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.simulator.simulator import Simulator
 
 DT = 0.01
 S = np.poly1d([1.0, 0.0])

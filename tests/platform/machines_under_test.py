@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from motion_cueing.envs.platform import ActuatorDynamics, Platform, get_platform, platform_names
+from motion_cueing.envs.platform import Platform, get_platform, platform_names
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 
 PRESETS = {name: get_platform(name) for name in platform_names()}
 DT = 0.01

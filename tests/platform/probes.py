@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from motion_cueing.baselines.washout import tilt
-from motion_cueing.envs.platform import Hexapod, cab, frames, hexapod, parameters
-from motion_cueing.envs.precision import mat33, mat63, real, vec2, vec3, vec6
+from motion_cueing.baselines.washout.kernels import blocks as tilt
+from motion_cueing.envs.arrays import mat33, mat63, real, vec2, vec3, vec6
+from motion_cueing.envs.platform import Hexapod, parameters
+from motion_cueing.envs.platform.kernels import geometry as cab
+from motion_cueing.envs.platform.kernels import geometry as frames
+from motion_cueing.envs.platform.kernels import geometry as hexapod
 
 wp.set_module_options({"enable_backward": False})
 

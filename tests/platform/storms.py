@@ -10,7 +10,7 @@ import numpy as np
 
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import Platform, actuator_limits
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.simulator.simulator import Simulator
 
 from ..reference import MachineModel
 from ..reference.comparison import motion_of

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.perception import get_vestibular_model
-from motion_cueing.envs.platform import ActuatorDynamics, Platform
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.platform import Platform
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
+from motion_cueing.envs.simulator.simulator import Simulator
 
 from ..reference import ReferenceSimulator
 from ..reference.comparison import adopt, differences, restless_drive

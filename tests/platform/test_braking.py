@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from motion_cueing.envs.platform import ACTUATORS, AXES, Platform, actuator_limits
+from motion_cueing.envs.platform import Platform, actuator_limits
+from motion_cueing.envs.platform.kernels import ACTUATORS, AXES
 
 from .machines_under_test import DT, PRESETS
 from .storms import simulator

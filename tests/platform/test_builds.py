@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import Platform
-from motion_cueing.envs.platform.builds import BuildRanges, drawn_machine, resized
 from motion_cueing.envs.platform.kinematics import legs_of_pose, pose_of_legs
-from motion_cueing.envs.platform.parameters import machine_parameters
-from motion_cueing.envs.platform.reach import axis_reach
+from motion_cueing.envs.platform.parameters import axis_reach, machine_parameters
+from motion_cueing.envs.platform.randomization import BuildRanges, drawn_machine, resized
 
 from .machines_under_test import DT, PRESETS
 

@@ -10,7 +10,6 @@ import yaml
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, GeometryError, UnknownNameError
 from motion_cueing.envs.platform import (
-    ActuatorDynamics,
     Carriage,
     Hexapod,
     Platform,
@@ -20,6 +19,7 @@ from motion_cueing.envs.platform import (
     load_platform,
     platform_names,
 )
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.platform.presets import neutral_height, paired_hexapod
 from motion_cueing.envs.settings import save, to_dict
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motion_cueing.envs.platform import ActuatorDynamics
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 
 from .frames import Floats
 

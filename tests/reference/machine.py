@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from motion_cueing.envs.platform import ActuatorDynamics, Platform
+from motion_cueing.envs.platform import Platform
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 
 from .frames import Floats, cross
 

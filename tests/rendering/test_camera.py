@@ -7,10 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.rendering.backend import load_pygame
-from motion_cueing.envs.rendering.camera import NEAR, Camera, clip_near, clip_segments, orbit
+from motion_cueing.envs.rendering.drawing import NEAR, Camera, clip_near, clip_segments, load_pygame, orbit
 from motion_cueing.envs.rendering.motion_view import joints
-from motion_cueing.envs.rendering.scene import Scene
+from motion_cueing.envs.rendering.renderer import Scene
 
 from .moments import moment
 

@@ -12,8 +12,8 @@ from PIL import Image
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.rendering import Renderer
-from motion_cueing.evaluation.film import check_suffix, film_frames, frame_rows, gif_rate, save_film
 from motion_cueing.evaluation.metrics import measure
+from motion_cueing.evaluation.reporting.film import check_suffix, film_frames, frame_rows, gif_rate, save_film
 
 from ..evaluation.synthetic import drive, trajectory
 from .moments import SIZE

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from motion_cueing.baselines import make_policy
-from motion_cueing.envs.car import get_car, get_maneuver
+from motion_cueing.envs.car import get_car
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.rendering import CueHistory, Renderer, append_state, motion_of
-from motion_cueing.envs.simulator import TIME_STEP, Simulator
-from motion_cueing.evaluation.film import film_frames
+from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
+from motion_cueing.evaluation.reporting.film import film_frames
 from motion_cueing.evaluation.rollout import rollout
 
 from .moments import SIZE

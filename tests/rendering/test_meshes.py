@@ -7,12 +7,20 @@ import pytest
 
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.rendering import theme
-from motion_cueing.envs.rendering.car_body import shell
-from motion_cueing.envs.rendering.legs import Legs, tubes
-from motion_cueing.envs.rendering.machine_parts import machine_parts
-from motion_cueing.envs.rendering.mesh import Mesh, along, box, circle, cylinder, joined, prism, sphere
+from motion_cueing.envs.rendering.drawing import (
+    Mesh,
+    along,
+    box,
+    circle,
+    cylinder,
+    joined,
+    prism,
+    shaded,
+    sphere,
+)
+from motion_cueing.envs.rendering.machine_model import Legs, machine_parts, tubes
 from motion_cueing.envs.rendering.motion_view import joints, leg_use
-from motion_cueing.envs.rendering.painting import shaded
+from motion_cueing.envs.rendering.surroundings import shell
 
 from .moments import moment
 

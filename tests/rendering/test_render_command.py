@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motion_cueing.evaluation.command_line import main
+from motion_cueing.cli.main import main
 
 QUICK = ["--maneuver", "lane-change", "--size", "640", "360"]
 

@@ -12,12 +12,10 @@ import pytest
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import Platform, get_platform, platform_names
 from motion_cueing.envs.rendering import CueHistory, Renderer, RenderingUnavailableError, theme
-from motion_cueing.envs.rendering.backend import load
-from motion_cueing.envs.rendering.gauges import signed
+from motion_cueing.envs.rendering.drawing import load
+from motion_cueing.envs.rendering.instruments import CHANNELS, PANEL_WIDTH, axis_range, shortened, signed
 from motion_cueing.envs.rendering.motion_view import head
-from motion_cueing.envs.rendering.panel import PANEL_WIDTH, shortened
-from motion_cueing.envs.rendering.scene import Scene
-from motion_cueing.envs.rendering.strip_chart import CHANNELS, axis_range
+from motion_cueing.envs.rendering.renderer import Scene
 
 from .moments import SIZE, moment, weaving
 

@@ -12,7 +12,7 @@ import pytest
 from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import actuator_limits
-from motion_cueing.envs.simulator import Simulator
+from motion_cueing.envs.simulator.simulator import Simulator
 
 from ..platform.machines_under_test import PRESETS
 from ..reference.cues import felt_cues

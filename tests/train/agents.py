@@ -8,8 +8,8 @@ import numpy as np
 
 from motion_cueing.baselines.washout.scheduled import KNOBS
 from motion_cueing.envs.task import TaskOptions
-from motion_cueing.envs.task.layout import layout_of
-from motion_cueing.train.agent import Agent, Network, Record
+from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.train.agents import Agent, Network, Record
 
 RECORD = Record(
     algo="ppo", seed=3, command="motion-cueing train --algo ppo", steps=1000, versions={"numpy": "2.0"}

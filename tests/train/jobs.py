@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from motion_cueing.train.checkpoint import checkpoints_in
 from motion_cueing.train.config import TrainingConfig
-from motion_cueing.train.engine.job import Ending, Job, Report
+from motion_cueing.train.experiments.engines import Ending, Job, Report
+from motion_cueing.train.experiments.jobs import TrainingJob
+from motion_cueing.train.run import checkpoints_in
 from motion_cueing.train.training import Status
-from motion_cueing.train.training_job import TrainingJob
 
 from . import tiny
 

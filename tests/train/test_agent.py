@@ -12,7 +12,7 @@ import pytest
 from motion_cueing.baselines.washout import ClassicalWashout, ScheduledWashout
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
-from motion_cueing.train.agent import Agent, Network
+from motion_cueing.train.agents import Agent, Network
 
 from .agents import RECORD, agent, network
 

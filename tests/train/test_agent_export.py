@@ -11,10 +11,10 @@ import onnxruntime
 import pytest
 import torch
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.train.agent import Network, export
-from motion_cueing.train.agent.export import ExportError, export_onnx, torch_module
+from motion_cueing.train.agents import Network, export
+from motion_cueing.train.agents.export import ExportError, export_onnx, torch_module
 
 from .agents import agent, network
 

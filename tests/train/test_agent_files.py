@@ -16,8 +16,9 @@ from safetensors.numpy import save_file
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError, UnknownNameError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.task import ActionOptions, EpisodeOptions, ObservationOptions, TaskOptions
-from motion_cueing.train.agent import Agent, agent_names, get_agent, shipped
-from motion_cueing.train.agent.files import FORMAT, checksum, read, write
+from motion_cueing.train.agents import Agent, agent_names, get_agent
+from motion_cueing.train.agents import agent as shipped
+from motion_cueing.train.agents.files import FORMAT, checksum, read, write
 
 from .agents import agent
 

@@ -7,8 +7,8 @@ import copy
 import pytest
 import torch
 
-from motion_cueing.train.actor import Actor
-from motion_cueing.train.descent import Descent
+from motion_cueing.train.networks import Actor
+from motion_cueing.train.optimizers import Descent
 
 
 def learner() -> tuple[Actor, torch.Tensor, torch.Tensor]:

@@ -14,23 +14,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.settings import save
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.train import studies
-from motion_cueing.train.agent import Agent
-from motion_cueing.train.checkpoint import checkpoints_in
+from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
-from motion_cueing.train.engine import processes as processes_engine
-from motion_cueing.train.engine import ray_engine
-from motion_cueing.train.engine.choose import make_engine
-from motion_cueing.train.engine.job import Engine, run_jobs
-from motion_cueing.train.engine.local import LocalEngine
-from motion_cueing.train.engine.ray_engine import RayEngine
-from motion_cueing.train.population import Population
-from motion_cueing.train.search import Search
+from motion_cueing.train.experiments import engines as processes_engine
+from motion_cueing.train.experiments import ray_engine
+from motion_cueing.train.experiments import seeds as studies
+from motion_cueing.train.experiments.engines import Engine, LocalEngine, make_engine, run_jobs
+from motion_cueing.train.experiments.jobs import TrainingJob
+from motion_cueing.train.experiments.population import Population
+from motion_cueing.train.experiments.ray_engine import RayEngine
+from motion_cueing.train.experiments.search import Search
+from motion_cueing.train.run import checkpoints_in
 from motion_cueing.train.training import Training
-from motion_cueing.train.training_job import TrainingJob
 
 from . import jobs
 

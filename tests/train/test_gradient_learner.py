@@ -10,11 +10,11 @@ import torch
 import yaml
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.train.agent import Agent, Record
+from motion_cueing.train.agents import Agent, Record
+from motion_cueing.train.algorithms.apg.gradients import ThroughTime
+from motion_cueing.train.algorithms.apg.learner import GradientLearner
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.gradient_learner import GradientLearner
-from motion_cueing.train.learner import StopTraining
-from motion_cueing.train.through_time import ThroughTime
+from motion_cueing.train.registry import StopTraining
 
 SMALL = {
     "n_envs": 3,

@@ -16,11 +16,10 @@ from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.task import ActionOptions, EpisodeOptions, TaskOptions
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.evaluation import rollout
+from motion_cueing.train.algorithms.apg.learner import GradientLearner
+from motion_cueing.train.algorithms.dagger.learner import ImitationLearner, Teacher, rest_of
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.gradient_learner import GradientLearner
-from motion_cueing.train.imitation_learner import ImitationLearner
-from motion_cueing.train.learner import StopTraining
-from motion_cueing.train.teacher import Teacher, rest_of
+from motion_cueing.train.registry import StopTraining
 
 SMALL = {
     "n_envs": 4,

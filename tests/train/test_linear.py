@@ -11,12 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.envs.task.layout import layout_of
+from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.train.algorithms.apg.learner import GradientLearner
+from motion_cueing.train.algorithms.linear.learner import (
+    LinearLearner,
+    LinearWashout,
+    coordinates,
+    gains,
+    washout_at,
+)
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.gradient_learner import GradientLearner
-from motion_cueing.train.learner import StopTraining
-from motion_cueing.train.linear_learner import LinearLearner
-from motion_cueing.train.linear_washout import LinearWashout, coordinates, gains, washout_at
+from motion_cueing.train.registry import StopTraining
 
 SMALL = {
     "n_envs": 2,

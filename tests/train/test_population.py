@@ -13,17 +13,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.settings import from_dict, load
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.train.agent import Agent
+from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
-from motion_cueing.train.engine.choose import make_engine
-from motion_cueing.train.fleet_progress import FleetProgress
+from motion_cueing.train.experiments.engines import make_engine
+from motion_cueing.train.experiments.population import Population, draw, explored, next_generation
 from motion_cueing.train.logs import read_log
-from motion_cueing.train.population import Population
+from motion_cueing.train.progress import FleetProgress
 from motion_cueing.train.run import RunFolder
-from motion_cueing.train.selection import draw, explored, next_generation
 from motion_cueing.train.training import Training
 
 from . import jobs
@@ -202,7 +201,7 @@ def test_a_member_that_fails_ends_it_and_a_broken_state_is_told(config, tmp_path
 
 
 def test_a_generation_without_a_finite_rating_ends_it(config, tmp_path, monkeypatch):
-    monkeypatch.setattr("motion_cueing.train.population.rating", lambda score, measure: math.nan)
+    monkeypatch.setattr("motion_cueing.train.experiments.population.rating", lambda score, measure: math.nan)
     population = Population.create(tmp_path / "one", replace(config, steps=240))
     with pytest.raises(DataError, match="generation 1: no member's validation is finite"):
         run(population)

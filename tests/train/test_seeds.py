@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.settings import load
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.train import studies
-from motion_cueing.train.agent import Agent
+from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig
-from motion_cueing.train.seeds import Seeds, summary
+from motion_cueing.train.experiments import seeds as studies
+from motion_cueing.train.experiments.seeds import Seeds, summary
 from motion_cueing.train.training import Training
 
 from . import tiny

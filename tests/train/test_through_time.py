@@ -9,11 +9,8 @@ import torch
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.options import TaskOptions
 from motion_cueing.envs.task.unroll import TaskUnroll
-from motion_cueing.train.actor import ACTIVATIONS, Actor, begin_at_rest
-from motion_cueing.train.actor_steps import ActorSteps
-from motion_cueing.train.ahead import Ahead, ValueOptions
-from motion_cueing.train.standard import standardise
-from motion_cueing.train.through_time import ThroughTime, tamed
+from motion_cueing.train.algorithms.apg.gradients import Ahead, ThroughTime, ValueOptions, tamed
+from motion_cueing.train.networks import TORCH_ACTIVATIONS, Actor, ActorSteps, begin_at_rest, standardise
 
 N, ACTIONS = 3, 12
 
@@ -27,7 +24,7 @@ def actor(activation: str = "elu", hidden: tuple[int, ...] = (5, 4)) -> Actor:
 
 
 @pytest.mark.parametrize("hidden", [(5, 4), (6,)])
-@pytest.mark.parametrize("activation", ACTIVATIONS)
+@pytest.mark.parametrize("activation", TORCH_ACTIVATIONS)
 def test_steps_by_hand_are_those_of_the_graph(activation, hidden):
     network = actor(activation, hidden)
     steps = ActorSteps(network)

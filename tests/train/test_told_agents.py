@@ -13,17 +13,14 @@ import torch
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.task import TaskOptions
-from motion_cueing.envs.task.ability import abilities, ability_of
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.layout import MACHINE
-from motion_cueing.envs.task.library import machines_of
-from motion_cueing.envs.task.scaling import acceleration_scale
-from motion_cueing.train.actor import Actor, begin_at_rest
-from motion_cueing.train.agent.export import export_onnx
+from motion_cueing.envs.task.drives import machines_of
+from motion_cueing.envs.task.observation import MACHINE, abilities, ability_of, acceleration_scale
+from motion_cueing.train.agents.export import export_onnx
+from motion_cueing.train.algorithms.apg.learner import GradientLearner
+from motion_cueing.train.algorithms.dagger.learner import Teacher
 from motion_cueing.train.config import load_config, validation_task
-from motion_cueing.train.gradient_learner import GradientLearner
-from motion_cueing.train.standard import standardise
-from motion_cueing.train.teacher import Teacher
+from motion_cueing.train.networks import Actor, begin_at_rest, standardise
 from motion_cueing.train.validation import Validation
 
 from ..env.tasks import drive

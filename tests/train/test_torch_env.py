@@ -8,7 +8,7 @@ import torch
 
 from motion_cueing.envs.errors import ActionError
 from motion_cueing.envs.task import EpisodeOptions
-from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.train.torch_env import DrivingSimulatorTorch
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 

@@ -13,15 +13,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motion_cueing.cli import train as train_command
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import load
-from motion_cueing.envs.task.reward_kernel import TERMS
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.train import interrupt, registry, train_command
-from motion_cueing.train.agent import Agent
-from motion_cueing.train.checkpoint import checkpoints_in
+from motion_cueing.envs.task.kernels.reward import TERMS
+from motion_cueing.train import registry
+from motion_cueing.train import training as interrupt
+from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig
-from motion_cueing.train.run import RunFolder
+from motion_cueing.train.run import RunFolder, checkpoints_in
 from motion_cueing.train.training import Training
 
 from . import tiny
@@ -188,7 +189,7 @@ def test_help_needs_no_learning_library():
 
 def test_another_algorithm_can_be_registered(tmp_path, monkeypatch):
     preset = tiny.config_file(tmp_path, "ppo", algo="mine")
-    module = "motion_cueing.train.sb3_learner"
+    module = "motion_cueing.train.algorithms.sb3.learner"
     monkeypatch.setattr(registry, "_ALGORITHMS", dict(registry._ALGORITHMS))
     monkeypatch.setitem(sys.modules[module].CLASSES, "mine", sys.modules[module].CLASSES["ppo"])
     registry.register(registry.Algorithm("mine", module, "the same again", preset=preset))

@@ -12,11 +12,9 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.task import ObservationOptions
-from motion_cueing.envs.task.layout import layout_of
-from motion_cueing.train.from_sb3 import load_network, network_of
-from motion_cueing.train.hyperparameters import arguments
-from motion_cueing.train.sb3_learner import CLASSES
-from motion_cueing.train.sb3_policy import SkipPolicy
+from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.train.algorithms.sb3.learner import CLASSES, arguments
+from motion_cueing.train.algorithms.sb3.policy import SkipPolicy, load_network, network_of
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 from ..env.tasks import SHORT

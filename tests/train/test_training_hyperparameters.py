@@ -12,9 +12,8 @@ from stable_baselines3.common.type_aliases import TrainFreq
 from torch import nn
 
 from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.train.algorithms.sb3.learner import CLASSES, arguments
 from motion_cueing.train.config import load_config
-from motion_cueing.train.hyperparameters import arguments
-from motion_cueing.train.sb3_learner import CLASSES
 
 
 @pytest.mark.parametrize("name", CLASSES)

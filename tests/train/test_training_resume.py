@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
-from motion_cueing.train.agent import Agent
-from motion_cueing.train.checkpoint import checkpoints_in, read_checkpoint, write_checkpoint
-from motion_cueing.train.run import RunFolder
+from motion_cueing.train.agents import Agent
+from motion_cueing.train.run import RunFolder, checkpoints_in, read_checkpoint, write_checkpoint
 from motion_cueing.train.training import Training
 
 from . import tiny

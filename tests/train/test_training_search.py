@@ -10,15 +10,15 @@ import optuna
 import pytest
 from optuna.trial import TrialState
 
+from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import from_dict, load
-from motion_cueing.evaluation.command_line import main
 from motion_cueing.train import training
-from motion_cueing.train.agent import Agent
+from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.engine.choose import make_engine
-from motion_cueing.train.fleet_progress import FleetProgress
-from motion_cueing.train.search import Search, suggest
+from motion_cueing.train.experiments.engines import make_engine
+from motion_cueing.train.experiments.search import Search, suggest
+from motion_cueing.train.progress import FleetProgress
 from motion_cueing.train.training import Training
 
 from . import tiny

@@ -9,11 +9,10 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from motion_cueing.baselines import ClassicalWashout, NoMotion
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.task import DrivingSimulator
-from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.metrics import measure
-from motion_cueing.train.logs import TrainingLog, read_log
-from motion_cueing.train.monitor import Monitor
+from motion_cueing.train.logs import Monitor, TrainingLog, read_log
 from motion_cueing.train.validation import Validation, tilt_rate
 
 from . import tiny

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from motion_cueing.envs.errors import ActionError, ConfigurationError
 from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions
-from motion_cueing.envs.task.reward_kernel import TERMS
+from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 from ..env.tasks import EVERY_OPTION, SHORT, drive, options

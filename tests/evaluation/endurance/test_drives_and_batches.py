@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import make_policy
-from motion_cueing.envs.car import car_names, drive_seeds, get_car
-from motion_cueing.envs.car.roads import KINDS as ROADS
+from motion_cueing.envs.car import car_names, get_car
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.envs.platform import ActuatorDynamics
+from motion_cueing.envs.maneuvers import drive_seeds
+from motion_cueing.envs.maneuvers.roads import KINDS as ROADS
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
 from motion_cueing.evaluation.endurance.batch_drivers import batch_driver
-from motion_cueing.evaluation.endurance.drives import seeded_drives
-from motion_cueing.evaluation.endurance.watch import watched
+from motion_cueing.evaluation.endurance.checks import watched
+from motion_cueing.evaluation.endurance.run import seeded_drives
 
 from ...train.agents import agent
 from ..studies import PAPER

@@ -7,10 +7,10 @@ import json
 
 import pytest
 
-from motion_cueing.envs.car import drive_seeds
+from motion_cueing.cli.main import main
 from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.evaluation import measure, rollout
-from motion_cueing.evaluation.command_line import main
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
 from motion_cueing.evaluation.endurance.results import EnduranceResults, Endured, EnduredDrive, summarised
 from motion_cueing.evaluation.endurance.run import Asked, Run, Stopped
@@ -101,8 +101,8 @@ def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
 
 
 def test_ctrl_c_ends_it_with_what_was_driven(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("motion_cueing.train.interrupt.Interrupt.asked", True, raising=False)
-    monkeypatch.setattr("motion_cueing.train.interrupt.Interrupt.__init__", lambda self: None)
+    monkeypatch.setattr("motion_cueing.train.training.Interrupt.asked", True, raising=False)
+    monkeypatch.setattr("motion_cueing.train.training.Interrupt.__init__", lambda self: None)
     assert main([*ARGV, "--out", str(tmp_path), *drive_hours(2)]) == 130
     assert "interrupted, the same command goes on; 0 drives driven now" in capsys.readouterr().out
     assert not EnduranceResults.load_json(tmp_path / "endurance.json").finished

@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.simulator import TIME_STEP, Simulator
-from motion_cueing.evaluation.endurance.legs import legs_of
-from motion_cueing.evaluation.endurance.limits import KINDS, TOLERANCE, TrueLimits
+from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
+from motion_cueing.evaluation.endurance.checks import KINDS, TOLERANCE, TrueLimits, legs_of
 
 from ...platform.machines_under_test import PRESETS
 from ...reference import MachineModel

@@ -7,18 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.car import get_maneuver
 from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation.loop import (
-    Controller,
-    ControllerOptions,
-    Cues,
-    FloatsFormat,
-    Patience,
-    make_machine,
-)
-from motion_cueing.evaluation.loop.inbox import Inbox
+from motion_cueing.realtime import Controller, ControllerOptions, Cues, FloatsFormat, Patience, make_machine
+from motion_cueing.realtime.inbox import Inbox
 
 AT_ONCE = Patience(steady=0.0, fade=0.0)
 SENDER = ("127.0.0.1", 9)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import ablation_names, get_platform, platform_names
 from motion_cueing.evaluation import rollout
-from motion_cueing.evaluation.loop import ControllerOptions, Patience, State
-from motion_cueing.evaluation.loop.homing import HomingOptions
-from motion_cueing.evaluation.loop.limit_check import LimitCheck
-from motion_cueing.evaluation.replay import cues_of
+from motion_cueing.evaluation.suite import cues_of
+from motion_cueing.realtime import ControllerOptions, Patience, State
+from motion_cueing.realtime.client import LimitCheck
+from motion_cueing.realtime.watchdog import HomingOptions
 
 from .loops import AT_ONCE, FLOATS, PAPER, REST, SENDER, Bench, lane_change
 
@@ -207,7 +207,7 @@ DATAGRAMS = st.lists(
     data=DATAGRAMS, seed=st.integers(0, 2**32 - 1), scale=st.sampled_from([1.0, 10.0, 1e3, 1e6, 1e150, 1e306])
 )
 def test_no_setpoint_leaves_the_limits_whatever_comes_and_whatever_the_policy_wants(data, seed, scale):
-    from motion_cueing.evaluation.loop.packets import Cues
+    from motion_cueing.realtime.packets import Cues
 
     bench = Bench(Wild(seed, scale), Patience(steady=0.0), rate=500)
     for item in data:

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motion_cueing.evaluation.loop.inbox import KINDS, Inbox
-from motion_cueing.evaluation.loop.packets import Cues, FloatsFormat
-from motion_cueing.evaluation.loop.sequence import Place, SequenceWindow
+from motion_cueing.realtime.inbox import KINDS, Inbox, Place, SequenceWindow
+from motion_cueing.realtime.packets import Cues, FloatsFormat
 
 FORM = FloatsFormat()
 ONE, OTHER = ("127.0.0.1", 1), ("127.0.0.1", 2)

@@ -13,21 +13,21 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from motion_cueing.cli import drive as drive_command
+from motion_cueing.cli import serve as serve_command
+from motion_cueing.cli.drive import DriveCommand
+from motion_cueing.cli.evaluate import EvaluateCommand, make_plan
+from motion_cueing.cli.main import main
+from motion_cueing.cli.serve import ServeCommand
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.evaluation import Trajectory, drive_command, serve_command
-from motion_cueing.evaluation.command_line import main
-from motion_cueing.evaluation.drive_command import DriveCommand
-from motion_cueing.evaluation.evaluate_command import EvaluateCommand, make_plan
-from motion_cueing.evaluation.loop.client import Client, cues_at
-from motion_cueing.evaluation.loop.endpoint import Endpoint, address_of, is_loopback
-from motion_cueing.evaluation.loop.limit_check import LimitCheck
-from motion_cueing.evaluation.loop.packets import Cues, SetPoint
-from motion_cueing.evaluation.loop.report import SCHEMA, LoopReport
-from motion_cueing.evaluation.loop.trouble import Trouble
-from motion_cueing.evaluation.loop.watchdog import State
-from motion_cueing.evaluation.serve_command import ServeCommand
+from motion_cueing.evaluation import Trajectory
 from motion_cueing.evaluation.suite import run_suite
+from motion_cueing.realtime.client import Client, LimitCheck, Trouble, cues_at
+from motion_cueing.realtime.packets import Cues, SetPoint
+from motion_cueing.realtime.report import SCHEMA, LoopReport
+from motion_cueing.realtime.server import Endpoint, address_of, is_loopback
+from motion_cueing.realtime.watchdog import State
 
 from .loops import FLOATS, PAPER, lane_change
 

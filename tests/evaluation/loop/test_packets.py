@@ -13,10 +13,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.evaluation.loop import message_pack
-from motion_cueing.evaluation.loop.formats import make_format
-from motion_cueing.evaluation.loop.packets import MOTION, MOTION_SIZE, Cues, FloatsFormat, SetPoint
-from motion_cueing.evaluation.loop.watchdog import State
+from motion_cueing.realtime import packets as message_pack
+from motion_cueing.realtime.packets import MOTION, MOTION_SIZE, Cues, FloatsFormat, SetPoint, make_format
+from motion_cueing.realtime.watchdog import State
 
 FORMATS = [make_format(name) for name in ("floats", "msgpack")]
 EVERY_FORMAT = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)

@@ -13,12 +13,12 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
-from motion_cueing.envs.task.layout import layout_of
+from motion_cueing.envs.task.observation import layout_of
 from motion_cueing.evaluation import rollout
-from motion_cueing.evaluation.loop import State, make_machine
-from motion_cueing.evaluation.loop.endpoint import Endpoint
-from motion_cueing.evaluation.loop.packets import Cues
 from motion_cueing.evaluation.policies import make_policy
+from motion_cueing.realtime import State, make_machine
+from motion_cueing.realtime.packets import Cues
+from motion_cueing.realtime.server import Endpoint
 
 from .loops import FLOATS, PAPER, Bench, lane_change
 

@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.evaluation.loop import Patience, State
-from motion_cueing.evaluation.loop.histogram import Histogram, TimingSummary
-from motion_cueing.evaluation.loop.pacing import Pace, undisturbed
-from motion_cueing.evaluation.loop.packets import Cues
-from motion_cueing.evaluation.loop.server import Server
+from motion_cueing.realtime import Patience, State
+from motion_cueing.realtime.packets import Cues
+from motion_cueing.realtime.server import Server
+from motion_cueing.realtime.timing import Histogram, Pace, TimingSummary, undisturbed
 
 from .loops import FLOATS, REST, SENDER, Bench
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.envs.platform.kinematics import legs_of_pose
-from motion_cueing.evaluation.loop.packets import MOTION
-from motion_cueing.evaluation.loop.track import Track
+from motion_cueing.realtime.machine import Track
+from motion_cueing.realtime.packets import MOTION
 
 from .loops import PAPER, Bench
 

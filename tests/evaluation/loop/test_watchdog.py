@@ -7,7 +7,7 @@ from itertools import product
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.evaluation.loop.watchdog import Patience, Situation, State, next_state
+from motion_cueing.realtime.watchdog import Patience, Situation, State, next_state
 
 PATIENCE = Patience(overdue=0.03, hold=0.2, steady=0.1)
 AGES = (0.0, 0.03, 0.031, 0.2, 0.201, float("inf"))

@@ -1,0 +1,400 @@
+r"""One step of the classical washout, Figures 2 and 3 of the paper, block by block.
+
+    omega_AA -> scale, limit -> T_S -> HPR -> beta1HP ----+-> SPLIT -> beta_H, psi_T
+    f_AA -> scale, limit -> f1 -> LP -> N -> limit -> betaSL
+                        \-> a2S -> HPS -> L_IS -> HPI -> Q' -> LPC -> C', S'
+
+What keeps machine and reference together stands in ``following``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+
+from ....envs.arrays import mat33, real, vec2, vec3, vec9
+from ....envs.perception.kernels import Vestibular
+from ....envs.platform.kernels.geometry import (
+    angular_acceleration,
+    angular_velocity,
+    cab_to_inertial,
+    centripetal_part,
+    gravity,
+    point_on_platform,
+    rate_matrix_inverse,
+    relative_acceleration,
+    turntable_rotation,
+)
+from ....envs.platform.kernels.step import Machine, SetPoint
+from ....envs.simulator.kernels.step import Drives, State, Zone, cue_error, next_state, perceived_error
+from .blocks import (
+    Command,
+    Gains,
+    Inputs,
+    Memory,
+    Parameters,
+    Reading,
+    Rotation,
+    Step,
+    command_axes,
+    hexapod_yaw_home,
+    high_pass,
+    initial_memory,
+    led_back,
+    limited_tilt,
+    low_pass,
+    moved,
+    read_observation,
+    read_state,
+    recovered,
+    tilt_angle_rates,
+    tilt_angles,
+)
+
+
+@wp.func
+def limited_force(p: Parameters, force: vec3) -> vec3:
+    """f'_AA: scaled and limited; the z channel on f_z + g, so that gravity stays."""
+    rest = -gravity()
+    scaled = wp.cw_mul(p.force_scale, force - rest)
+    return rest + wp.min(wp.max(scaled, -p.force_limit), p.force_limit)
+
+
+@wp.func
+def limited_rate_cue(p: Parameters, rate: vec3) -> vec3:
+    """omega'_AA: scaled and limited."""
+    return wp.min(wp.max(wp.cw_mul(p.rate_scale, rate), -p.rate_limit), p.rate_limit)
+
+
+@wp.func
+def high_pass_rates(p: Parameters, m: Memory, euler_rates: vec3, dt: real) -> vec3:
+    """HPR FILT: the high-passed Euler rates of roll, pitch and yaw."""
+    x = m.hpr_position
+    v = m.hpr_velocity
+    return vec3(
+        high_pass(p.hpr_roll, x[0], v[0], euler_rates[0], dt),
+        high_pass(p.hpr_pitch, x[1], v[1], euler_rates[1], dt),
+        high_pass(p.hpr_yaw, x[2], v[2], euler_rates[2], dt),
+    )
+
+
+@wp.func
+def tilt_acceleration(p: Parameters, m: Memory, psi: real, psi_rate: real, dt: real) -> vec2:
+    """Eq. (19) and the limits behind it: accelerations of betaSL."""
+    target = tilt_angles(m.low_force, psi) * p.tilt_gain
+    target_rate = tilt_angle_rates(m.low_force, m.low_force_rate, psi, psi_rate) * p.tilt_gain
+    roll = limited_tilt(
+        m.tilt[0], m.tilt_rate[0], target[0], target_rate[0],
+        p.tilt_approach, p.tilt_rate, p.tilt_acceleration, dt,
+    )  # fmt: skip
+    pitch = limited_tilt(
+        m.tilt[1], m.tilt_rate[1], target[1], target_rate[1],
+        p.tilt_approach, p.tilt_rate, p.tilt_acceleration, dt,
+    )  # fmt: skip
+    return vec2(roll, pitch)
+
+
+@wp.func
+def split(p: Parameters, m: Memory, beta_hp_acceleration: vec3, tilt: vec2) -> Rotation:
+    """Eqs. (22), (25) to (27): betaS = beta1HP + betaSL between hexapod and turntable."""
+    k_t = p.turntable_share
+    k_h = real(1.0) - k_t
+    r = Rotation()
+    r.beta = vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], m.psi_h_start + k_h * m.beta_hp[2])
+    r.beta_rate = vec3(
+        m.beta_hp_rate[0] + m.tilt_rate[0], m.beta_hp_rate[1] + m.tilt_rate[1], k_h * m.beta_hp_rate[2]
+    )
+    r.beta_acceleration = vec3(
+        beta_hp_acceleration[0] + tilt[0], beta_hp_acceleration[1] + tilt[1], k_h * beta_hp_acceleration[2]
+    )
+    gain = k_t * p.turntable_gain
+    r.psi_t = m.psi_t_start + gain * m.beta_hp[2]
+    r.psi_t_rate = gain * m.beta_hp_rate[2]
+    r.psi_t_acceleration = gain * beta_hp_acceleration[2]
+    return r
+
+
+@wp.func
+def cab_relative_acceleration(p: Parameters, r: Rotation) -> vec3:
+    """Eq. (37): aa_H at the cab's reference point."""
+    return relative_acceleration(
+        point_on_platform(p.cab, r.psi_t),
+        angular_velocity(r.beta, r.beta_rate),
+        angular_acceleration(r.beta, r.beta_rate, r.beta_acceleration),
+        r.psi_t_rate,
+        r.psi_t_acceleration,
+    )
+
+
+@wp.func
+def missing_acceleration(p: Parameters, r: Rotation, l_is: mat33, force: vec3) -> vec3:
+    """Eq. (48): a2S, what the translations must add."""
+    aa_s = wp.transpose(turntable_rotation(r.psi_t)) * cab_relative_acceleration(p, r)
+    return force - aa_s + wp.transpose(l_is) * gravity()
+
+
+@wp.func
+def high_pass_in_cab(p: Parameters, m: Memory, a2s: vec3, dt: real) -> vec3:
+    """HPS FILT: x and y high-passed in F_S."""
+    x = m.hps_position
+    v = m.hps_velocity
+    return vec3(
+        high_pass(p.hps_x, x[0], v[0], a2s[0], dt), high_pass(p.hps_y, x[1], v[1], a2s[1], dt), a2s[2]
+    )
+
+
+@wp.func
+def high_pass_in_space(p: Parameters, x: vec3, v: vec3, a2i: vec3, dt: real) -> vec3:
+    """HPI FILT: the acceleration of an oscillator at x, in F_I."""
+    return vec3(
+        high_pass(p.hpi_x, x[0], v[0], a2i[0], dt),
+        high_pass(p.hpi_y, x[1], v[1], a2i[1], dt),
+        high_pass(p.hpi_z, x[2], v[2], a2i[2], dt),
+    )
+
+
+@wp.func
+def carriage_acceleration(p: Parameters, m: Memory, dt: real) -> vec2:
+    """Eq. (49): acceleration of C' = LPC Q'."""
+    a_x = low_pass(p.lpc_frequency, p.lpc_damping, m.carriage[0], m.carriage_rate[0], m.displacement[0], dt)
+    a_y = low_pass(p.lpc_frequency, p.lpc_damping, m.carriage[1], m.carriage_rate[1], m.displacement[1], dt)
+    return vec2(a_x, a_y) * p.carriage_share
+
+
+@wp.func
+def advance_rotation(
+    p: Parameters, m: Memory, high_passed: vec3, alpha: vec3, tilt: vec2, dt: real
+) -> Memory:
+    """The rotational filters after the step."""
+    after = m
+    after.hpr_position = m.hpr_position + dt * m.hpr_velocity + (real(0.5) * dt * dt) * high_passed
+    after.hpr_velocity = m.hpr_velocity + dt * high_passed
+    after.beta_hp = m.beta_hp + dt * m.beta_hp_rate + (real(0.5) * dt * dt) * alpha
+    after.beta_hp_rate = m.beta_hp_rate + dt * alpha
+    after.tilt = m.tilt + dt * m.tilt_rate + (real(0.5) * dt * dt) * tilt
+    after.tilt_rate = m.tilt_rate + dt * tilt
+    return after
+
+
+@wp.func
+def advance_low_pass(p: Parameters, m: Memory, f1: vec3, dt: real) -> Memory:
+    """LP FILT after the step: fL."""
+    a_x = low_pass(p.tilt_frequency, p.tilt_damping, m.low_force[0], m.low_force_rate[0], f1[0], dt)
+    a_y = low_pass(p.tilt_frequency, p.tilt_damping, m.low_force[1], m.low_force_rate[1], f1[1], dt)
+    after = m
+    x = moved(m.low_force[0], m.low_force_rate[0], a_x, dt)
+    y = moved(m.low_force[1], m.low_force_rate[1], a_y, dt)
+    after.low_force = vec2(x[0], y[0])
+    after.low_force_rate = vec2(x[1], y[1])
+    return after
+
+
+@wp.func
+def advance_translation(m: Memory, q: vec3, c: vec2, dt: real) -> Memory:
+    """Q' and C' after the step."""
+    after = m
+    after.displacement = m.displacement + dt * m.velocity + (real(0.5) * dt * dt) * q
+    after.velocity = m.velocity + dt * q
+    after.carriage = m.carriage + dt * m.carriage_rate + (real(0.5) * dt * dt) * c
+    after.carriage_rate = m.carriage_rate + dt * c
+    return after
+
+
+@wp.func
+def cab_angles(p: Parameters, m: Memory) -> vec3:
+    """BetaS. The cab's true yaw: with k_yr or a turned start it is not the integral of the yaw cue."""
+    psi_s = m.psi_t_start + m.psi_h_start + yaw_share(p) * m.beta_hp[2]
+    return vec3(m.beta_hp[0] + m.tilt[0], m.beta_hp[1] + m.tilt[1], psi_s)
+
+
+@wp.func
+def yaw_share(p: Parameters) -> real:
+    """Yaw of the cab for a yaw cue of 1: other than 1 if k_yr is."""
+    return real(1.0) + p.turntable_share * (p.turntable_gain - real(1.0))
+
+
+@wp.func
+def advance_high_pass_in_cab(m: Memory, passed: vec3, dt: real) -> Memory:
+    """HPS FILT after the step."""
+    after = m
+    hps_x = moved(m.hps_position[0], m.hps_velocity[0], passed[0], dt)
+    hps_y = moved(m.hps_position[1], m.hps_velocity[1], passed[1], dt)
+    after.hps_position = vec2(hps_x[0], hps_y[0])
+    after.hps_velocity = vec2(hps_x[1], hps_y[1])
+    return after
+
+
+@wp.func
+def rate_roll_off(p: Parameters, dt: real) -> real:
+    """Angular acceleration for each rad/s of rate that is still missing, 1/s."""
+    return p.rate_bandwidth / (real(1.0) + real(0.5) * dt * p.rate_bandwidth)
+
+
+@wp.func
+def washout_with(p: Parameters, gains: Gains, m: Memory, seen: Reading, dt: real) -> Step:
+    """One step with gains before the high-passes, in the paper's order of blocks."""
+    force = limited_force(p, seen.force)
+    beta_s = cab_angles(p, m)
+    inputs = Inputs()
+    inputs.euler_rates = rate_matrix_inverse(beta_s) * limited_rate_cue(p, seen.rate)
+    high_passed = high_pass_rates(p, m, wp.cw_mul(gains.rate, inputs.euler_rates), dt)
+    alpha = (high_passed - hexapod_yaw_home(p, m) - m.beta_hp_rate) * rate_roll_off(p, dt)
+    tilt = tilt_acceleration(p, m, beta_s[2], yaw_share(p) * m.beta_hp_rate[2], dt)
+    r = split(p, m, alpha, tilt)
+
+    aa1_h = centripetal_part(point_on_platform(p.cab, r.psi_t), r.psi_t_rate)
+    f1 = force - wp.transpose(turntable_rotation(r.psi_t)) * aa1_h
+    inputs.l_is = cab_to_inertial(r.beta, r.psi_t)
+    inputs.missing = missing_acceleration(p, r, inputs.l_is, force)
+    inputs.passed = high_pass_in_cab(p, m, inputs.missing, dt)
+    a2i = inputs.l_is * wp.cw_mul(gains.force, inputs.passed)
+    q = recovered(p, m, high_pass_in_space(p, m.displacement, m.velocity, a2i, dt))
+    c = carriage_acceleration(p, m, dt)
+
+    after = advance_translation(advance_high_pass_in_cab(m, inputs.passed, dt), q, c, dt)
+    after = advance_rotation(p, after, high_passed, alpha, tilt, dt)
+    after = advance_low_pass(p, after, f1, dt)
+    out = Step()
+    out.command.memory = led_back(p, m, seen, r, after, dt)
+    out.command.action = command_axes(p, m, seen, r, q, c)
+    out.inputs = inputs
+    out.q = q
+    return out
+
+
+@wp.func
+def washout(p: Parameters, m: Memory, seen: Reading, dt: real) -> Command:
+    """One step of the classical washout."""
+    one = real(1.0)
+    gains = Gains()
+    gains.force = vec3(one, one, one)
+    gains.rate = vec3(one, one, one)
+    return washout_with(p, gains, m, seen, dt).command
+
+
+# A washout as kernels: from observations, fused with the machine; and the classical one with its adjoint.
+#
+# The kernels are made for the structs and the step of an algorithm. Warp reads their annotations, so
+# they must
+# not be kept as text here.
+
+
+@wp.struct
+class Score:
+    """Means over a drive."""
+
+    cue_error: real  # J
+    perceived_error: real
+    at_limit: real  # share of the steps in which a limit is met
+
+
+@wp.func
+def mean_score(cue_error: real, perceived_error: real, limited: real, count: real) -> Score:
+    """A score of sums over ``count`` samples."""
+    result = Score()
+    result.cue_error = cue_error / count
+    result.perceived_error = perceived_error / count
+    result.at_limit = limited / count
+    return result
+
+
+def predict_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
+    """A kernel: accelerations for a batch of observations; memories begin anew where an episode has begun.
+
+    Args:
+        Parameters: Struct of a parameter set.
+        Memory: Struct of the filters' states.
+        begin: (parameters, reading) -> memory when an episode begins.
+        step: (parameters, memory, reading, dt) -> a struct with ``action`` and ``memory``.
+    """
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def predict(
+        parameters: wp.array(dtype=Parameters),
+        parameters_of: wp.array(dtype=int),
+        observation: wp.array2d(dtype=real),
+        begins: wp.array(dtype=wp.bool),
+        memory: wp.array(dtype=Memory),
+        dt: real,
+        memory_out: wp.array(dtype=Memory),
+        action: wp.array(dtype=vec9),
+    ) -> None:
+        i = wp.tid()
+        p = parameters[parameters_of[i]]
+        seen = read_observation(observation, i)
+        m = memory[i]
+        if begins[i]:
+            m = begin(p, seen)
+        out = step(p, m, seen, dt)
+        memory_out[i] = out.memory
+        action[i] = out.action
+
+    return predict
+
+
+def drive_kernel(Parameters: Any, begin: Any, step: Any) -> Any:
+    """A kernel: algorithm and machine through whole drives in one launch, environment ``first`` and on.
+
+    Arguments as in :func:`predict_kernel`.
+    """
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def drive_through(
+        machines: wp.array(dtype=Machine),
+        vestibular: wp.array(dtype=Vestibular),
+        drives: Drives,
+        machine_of: wp.array(dtype=int),
+        drive_of: wp.array(dtype=int),
+        dt: real,
+        delay: wp.array2d(dtype=SetPoint),
+        parameters: wp.array(dtype=Parameters),
+        parameters_of: wp.array(dtype=int),
+        z: Zone,
+        initial: wp.array(dtype=State),
+        first: int,
+        score: wp.array(dtype=Score),
+    ) -> None:
+        i = first + wp.tid()
+        p = parameters[parameters_of[i]]
+        m = machines[machine_of[i]]
+        state = initial[i]
+        memory = begin(p, read_state(state))
+        count = drives.length[drive_of[i]]
+        cue = cue_error(z, state)
+        perceived = perceived_error(z, state)
+        limited = real(0.0)
+        for _ in range(1, count):
+            out = step(p, memory, read_state(state), dt)
+            memory = out.memory
+            state = next_state(m, vestibular[0], drives, drive_of[i], delay, i, state, out.action, dt)
+            cue = cue + cue_error(z, state)
+            perceived = perceived + perceived_error(z, state)
+            if state.limits != wp.uint64(0):
+                limited = limited + real(1.0)
+        score[i] = mean_score(cue, perceived, limited, real(count))
+
+    return drive_through
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def act(
+    parameters: wp.array(dtype=Parameters),
+    parameters_of: wp.array(dtype=int),
+    state: wp.array(dtype=State),
+    memory: wp.array(dtype=Memory),
+    begins: int,
+    dt: real,
+    memory_out: wp.array(dtype=Memory),
+    action: wp.array(dtype=vec9),
+) -> None:
+    """The washout on the simulator's own state, with its adjoint; memories begin anew where ``begins``."""
+    i = wp.tid()
+    p = parameters[parameters_of[i]]
+    seen = read_state(state[i])
+    m = memory[i]
+    if begins != 0:
+        m = initial_memory(p, seen)
+    out = washout(p, m, seen, dt)
+    memory_out[i] = out.memory
+    action[i] = out.action

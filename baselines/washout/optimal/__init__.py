@@ -1,0 +1,14 @@
+"""Optimal washout: linear filters that minimize the perceived error, by the Riccati equation."""
+
+from .design import HeaveWeights, OptimalParameters, PlaneWeights, YawWeights, load_optimal, optimal_presets
+from .policy import OptimalWashout
+
+__all__ = [
+    "HeaveWeights",
+    "OptimalParameters",
+    "OptimalWashout",
+    "PlaneWeights",
+    "YawWeights",
+    "load_optimal",
+    "optimal_presets",
+]

@@ -1,0 +1,187 @@
+"""``motion-cueing serve``: a policy as a controller in real time, over UDP."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from tyro.conf import arg
+
+from ..envs.errors import ConfigurationError
+from ..envs.platform import Platform
+from ..envs.storage import check_file
+from ..evaluation.reporting.text import words_of
+from ..evaluation.selection import find_platform
+from ..realtime.controller import Controller, ControllerOptions
+from ..realtime.inbox import Inbox
+from ..realtime.machine import LiveMachine, make_machine
+from ..realtime.packets import make_format
+from ..realtime.report import LoopReport, report_of, tell
+from ..realtime.server import Endpoint, Server, address_of, is_loopback
+from ..realtime.timing import undisturbed
+from ..realtime.watchdog import Patience, State
+from ..train.training import Interrupt
+
+DEFAULT_PORT: Final = 47100
+_VESTIBULAR: Final = "zacharias"
+
+
+@dataclass(frozen=True)
+class ServeCommand:
+    """Run a policy as a controller in real time: cues come over UDP, set-points go out.
+
+    Listens on this machine alone unless --host says otherwise. Ctrl-C brakes to neutral, writes the log and
+    the report, and ends. docs/loop.md describes the packets.
+    """
+
+    policy: Annotated[str, arg(metavar="NAME|FILE")] = "classical-tuned"
+    """Policy, by name or file; one that must know the whole drive cannot be served."""
+    rate: int = 1000
+    """Set-points a second, a multiple of 100; the policy acts 100 times a second."""
+    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
+    """Motion base, by name or YAML file."""
+    host: str = "127.0.0.1"
+    """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
+    port: int = DEFAULT_PORT
+    """Port to listen at; 0 for any that is free."""
+    peer: Annotated[str, arg(metavar="HOST[:PORT]")] = ""
+    """Listen to this sender alone; default: to the first, until it falls silent."""
+    format: Literal["floats", "msgpack"] = "floats"
+    """How packets are written."""
+    duration: float | None = None
+    """Time after which it brakes and ends, s; default: until Ctrl-C."""
+    overdue: float = Patience().overdue
+    """Age of the newest cues from which they are held, s."""
+    hold: float = Patience().hold
+    """Age from which the machine brakes and goes to neutral, s."""
+    stale: float = Patience().stale
+    """Delay on the way, beyond the least seen, from which a packet is too old, s."""
+    steady: float = Patience().steady
+    """How long cues must have come without a gap before the policy begins, s."""
+    fade: float = Patience().fade
+    """Time in which the cues come in then, s."""
+    lead: float = 0.001
+    """Time before its first set-point at which a step of 10 ms is decided, s; at most a period."""
+    cpu: int | None = None
+    """Core to run on alone."""
+    priority: int | None = None
+    """Real-time priority (SCHED_FIFO), 1 to 99; needs the right to it."""
+    log: Annotated[Path | None, arg(metavar="FILE.npz")] = None
+    """Trajectory to write, for `motion-cueing evaluate --replay`."""
+    report: Annotated[Path | None, arg(metavar="FILE.json")] = None
+    """Counts and timings to write."""
+
+
+@dataclass(frozen=True)
+class _Served:
+    """Everything a command names, made before anything listens."""
+
+    policy: Any
+    platform: Platform
+    machine: LiveMachine
+    controller: Controller
+
+
+def run(command: ServeCommand) -> int:
+    """Serve until it is stopped.
+
+    Raises:
+        MotionCueingError: an argument is wrong.
+    """
+    _check(command)
+    served = _made(command)
+    endpoint = Endpoint(address_of(command.host, command.port))
+    try:
+        server = Server(served.controller, endpoint, make_format(command.format), command.rate, command.lead)
+        _run(command, server, endpoint)
+    finally:
+        endpoint.close()
+    _finish(command, served, server, endpoint)
+    return 0
+
+
+def _check(command: ServeCommand) -> None:
+    if command.duration is not None and not command.duration > 0.0:
+        raise ConfigurationError(f"--duration must be positive, found {command.duration:g}")
+    if not command.lead >= 0.0:
+        raise ConfigurationError(f"--lead must not be negative, found {command.lead:g}")
+    if command.log is not None and command.log.suffix != ".npz":
+        raise ConfigurationError(f"--log {command.log}: a trajectory's file ends in .npz")
+    for option, file in (("--log", command.log), ("--report", command.report)):
+        if file is not None:
+            check_file(option, file)
+
+
+def _made(command: ServeCommand) -> _Served:
+    from ..evaluation.policies import make_policy
+
+    patience = Patience(command.overdue, command.hold, command.stale, command.steady, command.fade)
+    options = ControllerOptions(rate=command.rate, patience=patience)
+    peer = address_of(command.peer, 0) if command.peer else None
+    inbox = Inbox(make_format(command.format), patience.stale, patience.overdue, peer)
+    platform = find_platform(command.platform)
+    policy = make_policy(command.policy, platform)
+    machine = make_machine(policy, platform, _VESTIBULAR)
+    return _Served(policy, platform, machine, Controller(machine, platform, inbox, options))
+
+
+def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
+    host, port = endpoint.address
+    print(f"{command.policy} on {command.platform}: UDP {host}:{port}, {command.rate} set-points a second")
+    if not is_loopback(endpoint.address):
+        told = f"only {command.peer} moves it" if command.peer else "whoever sends first moves it; see --peer"
+        print(f"the network reaches {host}:{port}, beyond this machine: {told}")
+    sys.stdout.flush()
+
+
+@contextmanager
+def _terminated_gently() -> Iterator[None]:
+    """Take SIGTERM for Ctrl-C within the block; only the main thread can."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    earlier = signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)
+
+
+def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
+    interrupt, limit = Interrupt(), command.duration
+    with interrupt.caught(), _terminated_gently(), undisturbed(command.cpu, command.priority):
+        # Whoever reads it may stop the controller at once.
+        _announce(command, endpoint)
+        try:
+            server.run(lambda seconds: interrupt.asked or (limit is not None and seconds >= limit))
+        except KeyboardInterrupt:
+            print("stopped before the machine was home", file=sys.stderr)
+
+
+def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: Endpoint) -> None:
+    """Write the log and the report, and say what happened."""
+    report = _report(command, served.controller, server, endpoint)
+    tell(report, "steps of 10 ms", command.report)
+    log = served.controller.log
+    if command.log is not None and len(log) < 2:
+        print(f"--log {command.log} is not written: it ended within the first steps", file=sys.stderr)
+    elif command.log is not None:
+        log.trajectory(served.platform, served.machine.start, _VESTIBULAR, served.policy).save(command.log)
+
+
+def _report(command: ServeCommand, controller: Controller, server: Server, endpoint: Endpoint) -> LoopReport:
+    inbox, states = controller.inbox, controller.log.states
+    return report_of(
+        words_of("serve", command),
+        server,
+        periods=controller.periods,
+        packets={**inbox.counts, "lost": inbox.lost, "unsent": endpoint.unsent},
+        states={state: int((states == state).sum()) for state in State},
+        faults=controller.faults,
+    )

@@ -1,0 +1,1 @@
+"""Warp kernels of the car and its driver."""

@@ -1,0 +1,1 @@
+"""Import of logs of real cars: columns, timing, mounting."""

@@ -1,0 +1,180 @@
+"""Import of a recorded drive: from a log of any device to cues in the car's frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ..cues import GRAVITY, CueTrace, Floats
+from ..errors import DataError
+from .columns import FORCES, RATES, ImportOptions, RawLog, read_log
+from .mounting import Estimate, estimate, gather, shift, speed_delay
+from .timing import GapPolicy, Grid, Timing, close_gaps, low_pass, make_grid, on_grid
+
+SPEED_CUTOFF_HZ: Final = 1.0
+"""Cut-off of the speed channel, Hz: satellite and wheel speeds come in steps of about a tenth of a second."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What an import found and decided.
+
+    Attributes:
+        timing: Sample times and gaps.
+        device: Mounting, biases and correlations.
+        speed_delay: How long the speed lags behind the force, s.
+        gravity: Gravity as the device measures it, m/s^2.
+    """
+
+    timing: Timing
+    device: Estimate
+    speed_delay: float
+    gravity: float
+
+    def lines(self) -> list[str]:
+        """A report for people, angles in degrees."""
+        t, d, m = self.timing, self.device, self.device.mounting
+        roll, pitch, yaw = (math.degrees(angle) for angle in (m.roll, m.pitch, m.yaw))
+        bias = ", ".join(f"{math.degrees(b):.2f}" for b in d.rate_bias)
+        course = "no course" if d.rate_course is None else f"{d.rate_course:.3f}"
+        return [
+            f"rows               {t.rows}, {t.rate_hz:.1f} Hz, longest step {t.longest_step_s:.3f} s",
+            f"missing            {t.repeated} stamps, {t.empty_cells} cells; {t.bridged} gaps bridged",
+            f"mounting           roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} deg",
+            f"lateral axis       {'mirrored' if m.lateral_sign < 0 else 'as it is'}",
+            f"rates              {'reversed' if m.rate_sign < 0 else 'as they are'}",
+            f"gravity            {self.gravity:.3f} m/s^2 ({d.rest_from})",
+            f"bias of rates      {bias} deg/s (roll and pitch: {d.bias_from[0]}, yaw: {d.bias_from[1]})",
+            f"delay of speed     {self.speed_delay:.2f} s",
+            f"f_x with dv/dt     correlation {d.force_speed:.3f}",
+            f"f_y with v r       correlation {d.force_turn:.3f}",
+            f"heading, course    correlation {course}",
+            *(f"note               {note}" for note in d.notes),
+        ]
+
+
+@dataclass(frozen=True)
+class ImportedLog:
+    """A converted drive, with what was found on the way.
+
+    Attributes:
+        trace: Cues in F_A, with the channel ``speed_m_s`` if the log has a speed.
+        findings: What was estimated.
+        raw_force: (n, 3) unfiltered specific force in device axes, at the trace's times, m/s^2.
+        raw_rate: (n, 3) unfiltered angular velocity in device axes, at the trace's times, rad/s.
+    """
+
+    trace: CueTrace
+    findings: Findings
+    raw_force: Floats
+    raw_rate: Floats
+
+
+def import_log(
+    path: str | Path,
+    columns: Mapping[str, str],
+    *,
+    units: Mapping[str, str] | None = None,
+    options: ImportOptions | None = None,
+    name: str | None = None,
+) -> ImportedLog:
+    """Turn a log into cues.
+
+    The steps: read and scale the columns, close gaps, resample, estimate how the device sits
+    in the car, turn its axes into the car's, take out biases so that the car at rest feels
+    f = [0, 0, -9.81], and low-pass without delay.
+
+    Args:
+        path: A CSV file with a header row.
+        columns: Column of each signal (``time``, ``force_x`` to ``force_z``, ``rate_x`` to
+            ``rate_z``, and, if there are any, ``speed`` and ``course``). A leading ``-``
+            reverses a column; a number stands for a constant.
+        units: Unit of each signal, see :data:`.log_columns.UNITS`; SI by default.
+        options: Rate, filter, gaps, and what shall not be estimated.
+        name: Name of the trace; that of the file by default.
+
+    Raises:
+        ConfigurationError: a signal, unit or option is wrong.
+        DataError: the log is broken, or does not show what has to be estimated.
+    """
+    options = options or ImportOptions()
+    policy = GapPolicy(options.gaps, options.longest_step_s, options.longest_gap_s)
+    log = _cut(read_log(path, columns, units or {}), options)
+    series, timing = close_gaps(log, policy)
+    grid = make_grid(series, options.rate_hz, timing.rate_hz)
+    raw = {signal: on_grid(values, grid) for signal, values in series.items()}
+    findings = _find(raw, grid, timing, options)
+    return ImportedLog(
+        trace=_trace(name or Path(path).stem, str(Path(path).name), raw, grid, findings, options),
+        findings=findings,
+        raw_force=_stacked(raw, FORCES)[:: grid.every],
+        raw_rate=_stacked(raw, RATES)[:: grid.every],
+    )
+
+
+def _find(raw: Mapping[str, Floats], grid: Grid, timing: Timing, options: ImportOptions) -> Findings:
+    evidence = gather(
+        grid.rate_hz,
+        _stacked(raw, FORCES),
+        _stacked(raw, RATES),
+        raw.get("speed"),
+        raw.get("course"),
+        options.standstill_m_s,
+    )
+    delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
+    device = estimate(evidence.delayed(delay), options)
+    gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
+    return Findings(timing, device, delay, gravity)
+
+
+def _trace(
+    name: str, source: str, raw: Mapping[str, Floats], grid: Grid, findings: Findings, options: ImportOptions
+) -> CueTrace:
+    device = findings.device
+    force = device.mounting.force_in_car(_stacked(raw, FORCES))
+    force[:, 2] += findings.gravity - GRAVITY
+    rate = device.mounting.rate_in_car(_stacked(raw, RATES)) - device.rate_bias
+    channels = {}
+    if "speed" in raw:
+        smooth = low_pass(raw["speed"], grid.rate_hz, min(SPEED_CUTOFF_HZ, options.cutoff_hz))
+        speed = shift(smooth, findings.speed_delay, 1.0 / grid.rate_hz)
+        channels["speed_m_s"] = np.maximum(speed, 0.0)[:: grid.every]
+    return CueTrace(
+        name=name,
+        time=np.arange(len(grid.time[:: grid.every])) / options.rate_hz,
+        specific_force=low_pass(force, grid.rate_hz, options.cutoff_hz)[:: grid.every],
+        angular_velocity=low_pass(rate, grid.rate_hz, options.cutoff_hz)[:: grid.every],
+        channels=channels,
+        source=source,
+    )
+
+
+def _stacked(signals: Mapping[str, Floats], names: tuple[str, ...]) -> Floats:
+    return np.stack([signals[name] for name in names], axis=1)
+
+
+def _cut(log: RawLog, options: ImportOptions) -> RawLog:
+    """The rows between start and end; the course made continuous."""
+    # A row without a stamp is kept, for the gap policy to judge.
+    before = log.time < options.start_s
+    after = log.time > (math.inf if options.end_s is None else options.end_s)
+    keep = ~(before | after)
+    if not np.any(keep):
+        raise DataError(f"start_s {options.start_s:g}: no rows are left; the log has {len(log.time)}")
+    signals = {name: values[keep] for name, values in log.signals.items()}
+    if "course" in signals:
+        signals["course"] = _unwrapped(signals["course"])
+    return RawLog(log.time[keep], signals, log.rows[keep])
+
+
+def _unwrapped(course: Floats) -> Floats:
+    """Course (n,) without jumps of a full turn; NaN stays NaN."""
+    known = np.isfinite(course)
+    result = course.copy()
+    result[known] = np.unwrap(course[known])
+    return result

@@ -1,0 +1,373 @@
+"""How a device sits in a car: its attitude, and axes that are reversed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import binary_erosion
+from scipy.spatial.transform import Rotation
+
+from ..cues import Floats
+from ..errors import DataError
+from .columns import ImportOptions, Sign
+from .timing import low_pass
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """Attitude of a device in the car, and the signs of its axes.
+
+    With R = Rz(yaw) Ry(pitch) Rx(roll), which turns device axes into car axes, and
+    S = diag(1, lateral_sign, 1):
+
+        f_car = S R f_device                  (f: specific force)
+        w_car = rate_sign S R w_device        (w: angular velocity)
+
+    Attributes:
+        roll: Right side down positive, rad.
+        pitch: Nose up positive, rad.
+        yaw: To the right positive, rad.
+        lateral_sign: -1 if the force axes are left-handed.
+        rate_sign: -1 if the rates count the other way round than the right-hand rule
+            about the force axes says.
+    """
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    lateral_sign: int = 1
+    rate_sign: int = 1
+
+    @property
+    def matrix(self) -> Floats:
+        """(3, 3) S R, from device axes to car axes."""
+        rotation = Rotation.from_euler("ZYX", [self.yaw, self.pitch, self.roll]).as_matrix()
+        return np.asarray(np.diag([1.0, self.lateral_sign, 1.0]) @ rotation)
+
+    def force_in_car(self, force: ArrayLike) -> Floats:
+        """Specific force (..., 3) from device axes to car axes."""
+        return np.asarray(np.asarray(force) @ self.matrix.T)
+
+    def rate_in_car(self, rate: ArrayLike) -> Floats:
+        """Angular velocity (..., 3) from device axes to car axes."""
+        return np.asarray(self.rate_sign * (np.asarray(rate) @ self.matrix.T))
+
+
+def level(rest: ArrayLike) -> tuple[float, float]:
+    """Roll and pitch, rad, of a device that measures the specific force ``rest`` (3,) in a level car at rest.
+
+    From rest = R^T [0, 0, -g].
+    """
+    x, y, z = np.asarray(rest, dtype=np.float64)
+    return float(np.arctan2(-y, -z)), float(np.arctan2(x, np.hypot(y, z)))
+
+
+# What a log shows about its own device: the smoothed signals an estimate looks at.
+
+
+SMOOTHING_HZ: Final = 0.5
+"""Cut-off for everything that is estimated: below it, the car moves as a point with its speed and course."""
+
+STILL_EDGE_S: Final = 1.0
+"""Cut from both ends of a standstill, where the body still rocks, s."""
+
+LONGEST_DELAY_S: Final = 2.0
+"""Delay of a speed (satellite receivers average) searched for, s."""
+
+_DELAY_STEP_S: Final = 0.02
+_WEAK_FIT: Final = 0.1
+"""Share of the variance of dv/dt that the force must explain before a delay is believed."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Signals below :data:`SMOOTHING_HZ`, device axes, SI units.
+
+    Attributes:
+        dt: Time step, s.
+        force: (n, 3) specific force.
+        rate: (n, 3) angular velocity.
+        speed: (n,) or None.
+        course: (n,) unwrapped heading over ground, clockwise positive, or None.
+        still: (n,) true where the car stands.
+    """
+
+    dt: float
+    force: Floats
+    rate: Floats
+    speed: Floats | None
+    course: Floats | None
+    still: NDArray[np.bool_]
+
+    @property
+    def speed_rate(self) -> Floats:
+        """dv/dt (n,), zero where there is no speed."""
+        if self.speed is None:
+            return np.zeros(len(self.force))
+        return np.asarray(np.gradient(self.speed, self.dt))
+
+    def delayed(self, delay: float) -> Evidence:
+        """The evidence with speed and course moved ``delay`` seconds earlier."""
+        still = shift(self.still.astype(np.float64), delay, self.dt) > 0.5
+        speed = None if self.speed is None else shift(self.speed, delay, self.dt)
+        course = None if self.course is None else shift(self.course, delay, self.dt)
+        return replace(self, speed=speed, course=course, still=still)
+
+
+def gather(
+    rate_hz: float,
+    force: Floats,
+    rate: Floats,
+    speed: Floats | None,
+    course: Floats | None,
+    standstill: float,
+) -> Evidence:
+    """Smooth the signals of a log and find where the car stands (slower than ``standstill``, m/s)."""
+
+    def smooth(values: Floats) -> Floats:
+        return low_pass(values, rate_hz, SMOOTHING_HZ)
+
+    if speed is None:
+        still = np.zeros(len(force), dtype=np.bool_)
+    else:
+        window = np.ones(2 * int(STILL_EDGE_S * rate_hz) + 1, dtype=np.bool_)
+        still = binary_erosion(speed < standstill, window, border_value=1)
+    return Evidence(
+        dt=1.0 / rate_hz,
+        force=smooth(force),
+        rate=smooth(rate),
+        speed=None if speed is None else smooth(speed),
+        course=None if course is None else smooth(course),
+        still=still,
+    )
+
+
+def shift(values: Floats, delay: float, dt: float) -> Floats:
+    """Values (n,) ``delay`` seconds earlier, the last one held."""
+    time = dt * np.arange(len(values))
+    return np.asarray(np.interp(time + delay, time, values))
+
+
+def speed_delay(evidence: Evidence) -> float:
+    """How long the speed lags behind the force, s: where the force explains most of dv/dt.
+
+    The forward axis is not known yet, so dv/dt is regressed on all three axes.
+    """
+    if evidence.speed is None:
+        return 0.0
+    regressors = np.column_stack([evidence.force, np.ones(len(evidence.force))])
+    basis = np.linalg.qr(regressors)[0]
+    delays = np.arange(0.0, LONGEST_DELAY_S + _DELAY_STEP_S / 2, _DELAY_STEP_S)
+    fits = [_explained(basis, shift(evidence.speed_rate, delay, evidence.dt)) for delay in delays]
+    best = int(np.argmax(fits))
+    return float(delays[best]) if fits[best] > _WEAK_FIT else 0.0
+
+
+def _explained(basis: Floats, target: Floats) -> float:
+    centred = target - target.mean()
+    total = float(centred @ centred)
+    return float(np.sum((basis.T @ centred) ** 2)) / total if total > 0.0 else 0.0
+
+
+def correlation(a: Floats, b: Floats) -> float:
+    """Pearson's correlation, 0 where a signal does not vary."""
+    a, b = a - a.mean(), b - b.mean()
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / scale if scale > 0.0 else 0.0
+
+
+# Estimate of a mounting from the drive itself.
+#
+# Gravity gives roll and pitch. Horizontally the car's own motion is known twice: dv/dt along
+# x and v r along y; the turn (and, where the axes are left-handed, the reflection) that fits
+# the measured force to both gives yaw and the sense of y. The course gives the sense of r.
+
+
+CLEAR: Final = 0.3
+"""A correlation below this one decides nothing."""
+
+_STILL_S: Final = 2.0
+"""Standstill needed before it counts, after its edges are cut, s."""
+
+Origin = Literal["given", "standstill", "average", "course", "not estimated"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the log says about the device.
+
+    Attributes:
+        mounting: Attitude and signs.
+        rest: (3,) specific force at rest, device axes, m/s^2.
+        rest_from: How ``rest`` was found.
+        rate_bias: (3,) rad/s, car axes.
+        bias_from: How the biases of roll and pitch rate, and of yaw rate, were found.
+        force_speed: Correlation of f_x with dv/dt.
+        force_turn: Correlation of f_y with v r.
+        rate_course: Correlation of the integrated yaw rate with the course, or None.
+        notes: What the record could not tell.
+    """
+
+    mounting: Mounting
+    rest: Floats
+    rest_from: Origin
+    rate_bias: Floats
+    bias_from: tuple[Origin, Origin]
+    force_speed: float
+    force_turn: float
+    rate_course: float | None
+    notes: tuple[str, ...]
+
+
+def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
+    """Mounting and biases, each as given in ``options`` or else from the record.
+
+    Raises:
+        DataError: the yaw of the mounting is not given and the record does not show it.
+    """
+    rest, rest_from = _rest(evidence)
+    roll, pitch = (
+        found if given is None else math.radians(given)
+        for given, found in zip((options.roll_deg, options.pitch_deg), level(rest), strict=True)
+    )
+    levelled = Mounting(roll, pitch)
+    rate_sign, rate_course = _rate_sign(evidence, levelled, options.rate_sign)
+    yaw, lateral_sign = _heading(evidence, levelled, rate_sign, options)
+    mounting = Mounting(roll, pitch, yaw, lateral_sign, rate_sign)
+    bias, bias_from = _rate_bias(evidence, mounting, options)
+    force_speed, force_turn = _agreement(evidence, mounting)
+    if options.yaw_deg is None and max(force_speed, force_turn) < CLEAR:
+        raise DataError(
+            f"yaw_deg: the record does not show how the device is turned in the car (f_x with dv/dt "
+            f"{force_speed:.2f}, f_y with v r {force_turn:.2f}); give yaw_deg, or name a column for speed"
+        )
+    return Estimate(
+        mounting=mounting,
+        rest=rest,
+        rest_from=rest_from,
+        rate_bias=bias,
+        bias_from=bias_from,
+        force_speed=force_speed,
+        force_turn=force_turn,
+        rate_course=rate_course,
+        notes=_notes(mounting, rate_course, force_turn, options),
+    )
+
+
+def _rest(evidence: Evidence) -> tuple[Floats, Origin]:
+    """Specific force without the car's own acceleration: at rest, or as the constant of a regression."""
+    if evidence.still.sum() * evidence.dt >= _STILL_S:
+        return evidence.force[evidence.still].mean(axis=0), "standstill"
+    mean = evidence.force.mean(axis=0)
+    turning = _turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
+    regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning])
+    return np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0], "average"
+
+
+def _turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
+    """The product v r (n,), without the bias of r as far as its mean shows it."""
+    if evidence.speed is None:
+        return np.zeros(len(yaw_rate))
+    return np.asarray(evidence.speed * (yaw_rate - yaw_rate.mean()))
+
+
+def _rate_sign(evidence: Evidence, levelled: Mounting, choice: Sign) -> tuple[int, float | None]:
+    """Sense of the yaw rate: its integral has to follow the course over ground."""
+    if evidence.course is None:
+        return _chosen(choice, 1), None
+    heading = np.cumsum(levelled.rate_in_car(evidence.rate)[:, 2]) * evidence.dt
+    found = correlation(_detrended(heading), _detrended(evidence.course))
+    sign = _chosen(choice, -1 if found < -CLEAR else 1)
+    return sign, sign * found
+
+
+def _detrended(values: Floats) -> Floats:
+    # A straight line is what the bias of a rate leaves in its integral.
+    time = np.linspace(-1.0, 1.0, len(values))
+    slope, offset = np.polyfit(time, values, 1)
+    return np.asarray(values - slope * time - offset)
+
+
+def _heading(
+    evidence: Evidence, levelled: Mounting, rate_sign: int, options: ImportOptions
+) -> tuple[float, int]:
+    """Yaw of the mounting, rad, and the sense of its lateral axis.
+
+    For each sense, the turn psi that maximises
+    sum dv/dt f_x + v r f_y, with f_x + i f_y the levelled force turned by psi.
+    """
+    force = levelled.force_in_car(evidence.force)[:, :2]
+    x, y = (force - force.mean(axis=0)).T
+    along = evidence.speed_rate - evidence.speed_rate.mean()
+    across = _turn(evidence, rate_sign * levelled.rate_in_car(evidence.rate)[:, 2])
+    across = across - across.mean()
+
+    def fit(sign: int) -> tuple[float, float]:
+        cosine = along @ x + sign * (across @ y)
+        sine = sign * (across @ x) - along @ y
+        if options.yaw_deg is None:
+            return float(np.hypot(cosine, sine)), float(np.arctan2(sine, cosine))
+        yaw = math.radians(options.yaw_deg)
+        return float(np.cos(yaw) * cosine + np.sin(yaw) * sine), yaw
+
+    mirrored = options.lateral_sign == "flip"
+    if options.lateral_sign == "estimate" and fit(-1)[0] > fit(1)[0]:
+        trial = Mounting(levelled.roll, levelled.pitch, fit(-1)[1], -1, rate_sign)
+        # A reflection shows only where both axes are excited.
+        mirrored = min(_agreement(evidence, trial)) >= CLEAR
+    sign = -1 if mirrored else 1
+    return fit(sign)[1], sign
+
+
+def _agreement(evidence: Evidence, mounting: Mounting) -> tuple[float, float]:
+    """Correlations of f_x with dv/dt, and of f_y with v r."""
+    force = mounting.force_in_car(evidence.force)
+    turning = _turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
+    return correlation(force[:, 0], evidence.speed_rate), correlation(force[:, 1], turning)
+
+
+def _rate_bias(
+    evidence: Evidence, mounting: Mounting, options: ImportOptions
+) -> tuple[Floats, tuple[Origin, Origin]]:
+    """Bias of the rates, rad/s, car axes: at standstill, or so that the car ends as it began.
+
+    Roll and pitch come back to where they were on any road, yaw does not: without a
+    standstill its bias needs the course.
+    """
+    if options.rate_bias_deg_s is not None:
+        return np.radians(options.rate_bias_deg_s), ("given", "given")
+    rate = mounting.rate_in_car(evidence.rate)
+    if evidence.still.sum() * evidence.dt >= _STILL_S:
+        return rate[evidence.still].mean(axis=0), ("standstill", "standstill")
+    bias = rate.mean(axis=0)
+    if evidence.course is None:
+        return np.array([bias[0], bias[1], 0.0]), ("average", "not estimated")
+    drift = np.cumsum(rate[:, 2]) * evidence.dt - evidence.course
+    bias[2] = np.polyfit(evidence.dt * np.arange(len(drift)), drift, 1)[0]
+    return bias, ("average", "course")
+
+
+def _notes(
+    mounting: Mounting, rate_course: float | None, force_turn: float, options: ImportOptions
+) -> tuple[str, ...]:
+    notes = []
+    if force_turn < CLEAR and options.lateral_sign == "estimate":
+        notes.append("too little turning to check the sense of the lateral axis; taken as right-handed")
+    if rate_course is None and options.rate_sign == "estimate":
+        notes.append("no course: the sense of the rates is taken as it stands")
+        if mounting.lateral_sign < 0:
+            notes.append(
+                "lateral force and yaw rate disagree; the lateral axis was mirrored, but reversed rates "
+                "would look the same and the drive may be its mirror image: a column for course decides"
+            )
+    elif rate_course is not None and abs(rate_course) < CLEAR and options.rate_sign == "estimate":
+        notes.append("the course does not show the sense of the rates; taken as it stands")
+    return tuple(notes)
+
+
+def _chosen(choice: Sign, estimated: int) -> int:
+    return {"estimate": estimated, "keep": 1, "flip": -1}[choice]

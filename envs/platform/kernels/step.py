@@ -1,0 +1,576 @@
+"""Output limiting of one actuator, which brakes in time.
+
+An actuator moves with constant acceleration over a step. Its state (q, v) is safe at an upper end
+q_max if it can stop before it with the acceleration limit A, in whole steps:
+
+    v <= 0 and q <= q_max,   or   v^2 / (2 A) + A dt^2 / 8 <= q_max - q.
+
+The set is invariant: from every safe state a speed v' exists with |v' - v| <= A dt that leads to a
+safe state again, so position, speed and acceleration limits hold together and for ever, and no end
+of travel is met with a bump. Solving the condition of the next state for v' gives the bound of
+:func:`braking_speed`. Between the limits the actuator does exactly what it is told.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.linalg import expm
+
+from ...arrays import mat65, real, vec2, vec3, vec6, vec9
+from ...settings import NonNegative, Positive, configuration
+from .geometry import (
+    NEWTON_TOLERANCE,
+    HexapodGeometry,
+    Jacobian,
+    determinant,
+    forward_kinematics,
+    leg_extensions,
+    leg_jacobian,
+    leg_rates,
+    platform_rates,
+)
+
+
+@wp.func
+def braking_speed(distance: real, speed: real, acceleration: real, dt: real) -> real:
+    """Greatest speed towards an end of travel ``distance`` away, after a step begun at ``speed``."""
+    half_step = real(0.5) * acceleration * dt
+    room = distance - real(0.5) * speed * dt
+    # The threshold is where the root equals the half step; below it only standing still is safe.
+    if room <= half_step * dt * real(0.25):
+        return real(0.0)
+    return wp.sqrt(real(2.0) * acceleration * room) - half_step
+
+
+@wp.func
+def rate_bounds(
+    q: real, v: real, q_min: real, q_max: real, velocity: real, acceleration: real, dt: real
+) -> vec2:
+    """Least and greatest speed at the end of the step that keep the actuator within all its limits."""
+    upper = wp.min(velocity, braking_speed(q_max - q, v, acceleration, dt))
+    lower = -wp.min(velocity, braking_speed(q - q_min, -v, acceleration, dt))
+    return vec2(
+        wp.min(wp.max(lower, v - acceleration * dt), v + acceleration * dt),
+        wp.max(wp.min(upper, v + acceleration * dt), v - acceleration * dt),
+    )
+
+
+@wp.func
+def is_safe(q: real, v: real, q_min: real, q_max: real, acceleration: real, dt: real) -> bool:
+    """Whether (q, v) lies in the safe set of both ends."""
+    distance = q_max - q
+    if v < real(0.0):
+        distance = q - q_min
+    needed = real(0.0)
+    if v != real(0.0):
+        needed = real(0.5) * v * v / acceleration + real(0.125) * acceleration * dt * dt
+    return distance >= needed and q >= q_min and q <= q_max
+
+
+@wp.func
+def active_limit(
+    asked: real, q: real, v: real, q_min: real, q_max: real, velocity: real, acceleration: real, dt: real
+) -> int:
+    """Which limit holds back the speed ``asked`` for: 0 none, 1 end of travel, 2 velocity, 4 acceleration."""
+    bounds = rate_bounds(q, v, q_min, q_max, velocity, acceleration, dt)
+    if asked >= bounds[0] and asked <= bounds[1]:
+        return 0
+    ahead = q_max - q
+    towards = v
+    bound = bounds[1]
+    if asked < bounds[0]:
+        ahead = q - q_min
+        towards = -v
+        bound = -bounds[0]
+    if braking_speed(ahead, towards, acceleration, dt) <= wp.min(velocity, bound):
+        return 1
+    if bound >= velocity:
+        return 2
+    return 4
+
+
+# What the kernels know of a machine (constant) and of its motion (changing).
+
+
+CARRIAGE = slice(0, 2)
+LEGS = slice(2, 8)
+TURNTABLE = 8
+"""Order of the nine actuators: carriage x and y, legs 1 to 6, turntable."""
+
+ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "leg_5", "leg_6", "turntable")
+"""Names of the nine actuators."""
+
+AXES = ("carriage_x", "carriage_y", "surge", "sway", "heave", "roll", "pitch", "yaw", "turntable")
+"""Names of the nine degrees of freedom an action commands, in its order."""
+
+END_OF_TRAVEL: Final = 0x111111111
+"""Bits of a step's limits that say an end of travel, one for each actuator."""
+
+SINGULAR: Final = 0x888888888
+"""Bits that say a nearly singular pose."""
+
+
+@wp.struct
+class Machine:
+    """Constants of one machine. Actuator vectors are in the order of :data:`ACTUATORS`."""
+
+    geometry: HexapodGeometry
+    neutral_determinant: real  # det(J) at neutral
+    position_min: vec9  # m, m, 6 x m, rad
+    position_max: vec9
+    velocity: vec9  # m/s, rad/s
+    acceleration: vec9  # m/s^2, rad/s^2
+    cab: vec3  # D_o: reference point of the cab from the turntable's axis, turntable at 0
+    head: vec3  # D_o + OP_SS: the driver's head
+    lag: mat65  # transition of the three actuator dynamics, see actuators.py
+    lags: wp.vec3i  # whether carriage, legs, turntable lag
+    dead_steps: wp.vec3i  # their dead times in steps
+    has_dynamics: int  # whether any of them lags or has a dead time
+
+
+@wp.struct
+class Motion:
+    """Where the machine is and how fast it moves."""
+
+    position: vec9  # of the actuators: m, 6 x m from neutral, rad
+    rate: vec9
+    displacement: vec3  # s: origin of F_H from neutral, in F_V, m
+    velocity: vec3  # sdot
+    beta: vec3  # beta_H: roll, pitch, yaw of the hexapod, rad
+    beta_rate: vec3
+
+
+@wp.struct
+class SetPoint:
+    """Actuator set-points of an earlier step, for dead time and lag."""
+
+    position: vec9
+    rate: vec9
+
+
+@wp.struct
+class Step:
+    """One step of the machine: where it came to, how it accelerated, what held it back."""
+
+    motion: Motion
+    acceleration: vec9  # mean over the step, in the order of AXES
+    limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
+
+
+# Actuator dynamics: a second-order lag and a dead time for each subsystem. None by default, as in the paper.
+#
+# The lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere
+# negative: position, speed and acceleration of the machine are weighted means of those of the set-point,
+# and keep every limit the set-point keeps. Within a step the set-point moves with constant acceleration;
+# for that input the lag is discretised exactly.
+
+
+@configuration
+class ActuatorDynamics:
+    """Second-order lag and dead time of one subsystem.
+
+    Args:
+        natural_frequency: omega, rad/s; None for no lag (unity).
+        damping: zeta, at least 1 so that no limit is overshot.
+        dead_time: Pure delay, s; rounded to whole time steps.
+    """
+
+    natural_frequency: Positive | None = None
+    damping: Annotated[float, Field(ge=1.0)] = 1.0
+    dead_time: NonNegative = 0.0
+
+
+def lag_transition(dynamics: ActuatorDynamics, dt: float) -> NDArray[np.float64]:
+    """(2, 5) matrix from [y, ydot, u, udot, uddot] to [y, ydot] one step later, u being the set-point.
+
+    Zero where there is no lag; such a subsystem is not filtered.
+    """
+    omega = dynamics.natural_frequency
+    if omega is None:
+        return np.zeros((2, 5))
+    system = np.zeros((5, 5))
+    system[0, 1] = 1.0
+    system[1, :3] = [-(omega**2), -2.0 * dynamics.damping * omega, omega**2]
+    system[2, 3] = system[3, 4] = 1.0
+    return np.asarray(expm(system * dt)[:2])
+
+
+@wp.func
+def subsystem(actuator: int) -> int:
+    """0 carriage, 1 hexapod, 2 turntable."""
+    if actuator < 2:
+        return 0
+    if actuator < 8:
+        return 1
+    return 2
+
+
+@wp.func
+def lag(
+    m: Machine, actuator: int, y: real, y_rate: real, u: real, u_rate: real, u_next: real, dt: real
+) -> vec2:
+    """Position and rate of a lagging actuator after a step; its set-point's rate goes to ``u_next``."""
+    row = 2 * subsystem(actuator)
+    u_acceleration = (u_next - u_rate) / dt
+    position = (
+        m.lag[row, 0] * y
+        + m.lag[row, 1] * y_rate
+        + m.lag[row, 2] * u
+        + m.lag[row, 3] * u_rate
+        + m.lag[row, 4] * u_acceleration
+    )
+    rate = (
+        m.lag[row + 1, 0] * y
+        + m.lag[row + 1, 1] * y_rate
+        + m.lag[row + 1, 2] * u
+        + m.lag[row + 1, 3] * u_rate
+        + m.lag[row + 1, 4] * u_acceleration
+    )
+    return vec2(position, rate)
+
+
+# Singular poses, in which the legs do not hold the platform: it is kept from coming to rest near one.
+
+
+NEARLY_SINGULAR = wp.constant(real(0.15))
+"""Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
+
+FAR_FROM_SINGULAR = wp.constant(real(0.75))
+"""Clearance from which braking is taken not to lead to a singular pose."""
+
+NEIGHBOURHOOD = wp.constant(real(0.35))
+"""Largest change of an Euler angle while the legs brake, rad; more means a singular pose between."""
+
+
+@wp.func
+def clearance(m: Machine, displacement: vec3, beta: vec3) -> real:
+    """det(J) of a pose over that of neutral: 0 in a singular pose, negative behind it."""
+    return determinant(leg_jacobian(m.geometry, displacement, beta)) / m.neutral_determinant
+
+
+@wp.func
+def is_clear(m: Machine, pose: vec6, extensions: vec6, beta: vec3, least: real) -> bool:
+    """Whether a pose has these legs, is a neighbour of the one with ``beta``, and not nearly singular.
+
+    Behind a singular pose Newton's iteration finds no pose, or one far off. Comparisons with NaN are false.
+    """
+    displacement = vec3(pose[0], pose[1], pose[2])
+    angles = vec3(pose[3], pose[4], pose[5])
+    error = wp.max(wp.abs(leg_extensions(m.geometry, displacement, angles) - extensions))
+    closes = error <= real(10.0) * NEWTON_TOLERANCE
+    near = wp.max(wp.abs(angles - beta)) <= NEIGHBOURHOOD
+    return closes and near and clearance(m, displacement, angles) >= least
+
+
+@wp.func
+def keeps_clear(
+    m: Machine,
+    start: Motion,
+    jacobian: Jacobian,
+    displacement: vec3,
+    beta: vec3,
+    extensions: vec6,
+    rates: vec6,
+) -> bool:
+    """Whether the platform, braking from a pose with this Jacobian, comes to rest clear of singular poses.
+
+    While each leg brakes, the extensions it comes to rest at stay the same, so what holds now holds until
+    rest. In a nearly singular pose any motion that ends clearer than it began is allowed.
+    """
+    now = determinant(jacobian) / m.neutral_determinant
+    if now >= FAR_FROM_SINGULAR:
+        return True
+    least = wp.min(NEARLY_SINGULAR, clearance(m, start.displacement, start.beta))
+    if now < least:
+        return False
+    halfway = extensions
+    resting = extensions
+    for i in range(6):
+        way = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
+        halfway[i] = extensions[i] + real(0.5) * way
+        resting[i] = extensions[i] + way
+    middle = forward_kinematics(m.geometry, halfway, displacement, beta)
+    rest = forward_kinematics(
+        m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
+    )
+    return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
+
+
+# One step of the machine: nine accelerations in, the true motion out.
+#
+#     command -> limited set-point -> dead time -> lag -> true motion
+#
+# The set-point starts each step where limiting left it, so a command never winds up. Carriage and
+# turntable are limited axis by axis. A hexapod command is followed exactly where every leg may; else each
+# leg goes as far towards it as its limits allow and the platform goes where forward kinematics says.
+
+
+@wp.struct
+class Bounds:
+    """Least and greatest speed of every actuator after a step, by :func:`~.limiter.rate_bounds`."""
+
+    lower: vec9
+    upper: vec9
+
+
+@wp.func
+def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
+    """The bounds of all actuators."""
+    lower = vec9()
+    upper = vec9()
+    for i in range(9):
+        pair = rate_bounds(
+            start.position[i],
+            start.rate[i],
+            m.position_min[i],
+            m.position_max[i],
+            m.velocity[i],
+            m.acceleration[i],
+            dt,
+        )
+        lower[i] = pair[0]
+        upper[i] = pair[1]
+    bounds = Bounds()
+    bounds.lower = lower
+    bounds.upper = upper
+    return bounds
+
+
+@wp.func
+def limit_flag(m: Machine, start: Motion, bounds: Bounds, i: int, asked: real, dt: real) -> wp.uint64:
+    """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask; none for a missing one."""
+    if (asked >= bounds.lower[i] and asked <= bounds.upper[i]) or m.position_max[i] <= m.position_min[i]:
+        return wp.uint64(0)
+    code = active_limit(
+        asked,
+        start.position[i],
+        start.rate[i],
+        m.position_min[i],
+        m.position_max[i],
+        m.velocity[i],
+        m.acceleration[i],
+        dt,
+    )
+    return wp.lshift(wp.uint64(code), wp.uint64(4 * i))
+
+
+@wp.func
+def limited_rate(bounds: Bounds, i: int, asked: real) -> real:
+    """Speed of actuator ``i`` nearest the one asked for that keeps its limits."""
+    return wp.min(wp.max(asked, bounds.lower[i]), bounds.upper[i])
+
+
+@wp.func
+def legs_may_follow(m: Machine, bounds: Bounds, extensions: vec6, rates: vec6, dt: real) -> bool:
+    """Whether every leg can be at these extensions and rates after the step, and stop in time thereafter."""
+    may = bool(True)
+    for i in range(6):
+        k = i + 2
+        if rates[i] < bounds.lower[k] or rates[i] > bounds.upper[k]:
+            may = False
+        if not is_safe(extensions[i], rates[i], m.position_min[k], m.position_max[k], m.acceleration[k], dt):
+            may = False
+    return may
+
+
+@wp.func
+def joined(carriage_x: real, carriage_y: real, legs: vec6, turntable: real) -> vec9:
+    """The nine actuators of their parts."""
+    return vec9(carriage_x, carriage_y, legs[0], legs[1], legs[2], legs[3], legs[4], legs[5], turntable)
+
+
+@wp.func
+def legs_of(actuators: vec9) -> vec6:
+    """The six legs among the nine actuators."""
+    return vec6(actuators[2], actuators[3], actuators[4], actuators[5], actuators[6], actuators[7])
+
+
+@wp.func
+def with_legs(motion: Motion, extensions: vec6, rates: vec6) -> Motion:
+    """A motion with its legs replaced."""
+    after = motion
+    after.position = joined(motion.position[0], motion.position[1], extensions, motion.position[8])
+    after.rate = joined(motion.rate[0], motion.rate[1], rates, motion.rate[8])
+    return after
+
+
+@wp.func
+def with_pose(motion: Motion, pose: vec6, pose_rate: vec6) -> Motion:
+    """A motion with the platform's pose replaced."""
+    after = motion
+    after.displacement = vec3(pose[0], pose[1], pose[2])
+    after.beta = vec3(pose[3], pose[4], pose[5])
+    after.velocity = vec3(pose_rate[0], pose_rate[1], pose_rate[2])
+    after.beta_rate = vec3(pose_rate[3], pose_rate[4], pose_rate[5])
+    return after
+
+
+@wp.func
+def pose_from_legs(m: Machine, motion: Motion, guess: Motion) -> Motion:
+    """The motion whose pose and rates follow from its legs, by forward kinematics from a neighbouring one."""
+    pose = forward_kinematics(m.geometry, legs_of(motion.position), guess.displacement, guess.beta)
+    beta = vec3(pose[3], pose[4], pose[5])
+    jacobian = leg_jacobian(m.geometry, vec3(pose[0], pose[1], pose[2]), beta)
+    return with_pose(motion, pose, platform_rates(jacobian, beta, legs_of(motion.rate)))
+
+
+@wp.func
+def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
+    """``target`` with each leg brought as near to its rate as its limits allow, and the pose that follows."""
+    extensions = vec6()
+    limited = vec6()
+    for i in range(6):
+        limited[i] = limited_rate(bounds, i + 2, rates[i])
+        extensions[i] = start.position[i + 2] + real(0.5) * dt * (start.rate[i + 2] + limited[i])
+    return pose_from_legs(m, with_legs(target, extensions, limited), start)
+
+
+@wp.func
+def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
+    """Legs towards their asked rates, or braking to rest where that would lead into a singular pose."""
+    moved = legs_towards(m, start, bounds, target, rates, dt)
+    s = moved.displacement
+    b = moved.beta
+    jacobian = leg_jacobian(m.geometry, s, b)
+    if keeps_clear(m, start, jacobian, s, b, legs_of(moved.position), legs_of(moved.rate)):
+        return moved
+    return legs_towards(m, start, bounds, target, vec6(), dt)
+
+
+@wp.func
+def limit_axes(start: Motion, bounds: Bounds, action: vec9, dt: real) -> Motion:
+    """Carriage and turntable after the step, each within its own limits; the hexapod as it was."""
+    half = real(0.5) * dt
+    x = limited_rate(bounds, 0, start.rate[0] + action[0] * dt)
+    y = limited_rate(bounds, 1, start.rate[1] + action[1] * dt)
+    t = limited_rate(bounds, 8, start.rate[8] + action[8] * dt)
+    after = start
+    after.rate = joined(x, y, legs_of(start.rate), t)
+    after.position = joined(
+        start.position[0] + half * (start.rate[0] + x),
+        start.position[1] + half * (start.rate[1] + y),
+        legs_of(start.position),
+        start.position[8] + half * (start.rate[8] + t),
+    )
+    return after
+
+
+@wp.func
+def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
+    """The set-point after a step with nine accelerations, within all limits."""
+    half = real(0.5) * dt
+    linear = vec3(action[2], action[3], action[4])
+    angular = vec3(action[5], action[6], action[7])
+    velocity = start.velocity + linear * dt
+    beta_rate = start.beta_rate + angular * dt
+    displacement = start.displacement + (start.velocity + velocity) * half
+    beta = start.beta + (start.beta_rate + beta_rate) * half
+
+    bounds = all_bounds(m, start, dt)
+    after = limit_axes(start, bounds, action, dt)
+    jacobian = leg_jacobian(m.geometry, displacement, beta)
+    extensions = leg_extensions(m.geometry, displacement, beta)
+    rates = leg_rates(jacobian, velocity, beta, beta_rate)
+    clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates)
+    mask = command_limits(m, start, bounds, action, rates, clear, dt)
+    if legs_may_follow(m, bounds, extensions, rates, dt) and clear:
+        after = with_legs(after, extensions, rates)
+        after.displacement = displacement
+        after.velocity = velocity
+        after.beta = beta
+        after.beta_rate = beta_rate
+    else:
+        after = limited_legs(m, start, bounds, after, rates, dt)
+
+    result = Step()
+    result.motion = after
+    result.limits = mask
+    return result
+
+
+@wp.func
+def command_limits(
+    m: Machine, start: Motion, bounds: Bounds, action: vec9, leg_rates_asked: vec6, clear: bool, dt: real
+) -> wp.uint64:
+    """Which limits a command meets, as :class:`Step`'s mask."""
+    mask = wp.uint64(0)
+    for i in range(9):
+        asked = start.rate[i] + action[i] * dt
+        if i >= 2 and i < 8:
+            asked = leg_rates_asked[i - 2]
+            if not clear:
+                mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
+        mask = mask | limit_flag(m, start, bounds, i, asked, dt)
+    return mask
+
+
+@wp.func
+def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
+    """Accelerations of the nine degrees of freedom over a step, in the order of AXES."""
+    linear = (after.velocity - before.velocity) / dt
+    angular = (after.beta_rate - before.beta_rate) / dt
+    return vec9(
+        (after.rate[0] - before.rate[0]) / dt,
+        (after.rate[1] - before.rate[1]) / dt,
+        linear[0],
+        linear[1],
+        linear[2],
+        angular[0],
+        angular[1],
+        angular[2],
+        (after.rate[8] - before.rate[8]) / dt,
+    )
+
+
+@wp.func
+def actuate(
+    m: Machine,
+    motion: Motion,
+    delay: wp.array2d(dtype=SetPoint),
+    environment: int,
+    setpoint: Motion,
+    dt: real,
+) -> Motion:
+    """The true motion after a step: the set-point after dead time and lag.
+
+    ``delay[environment, k]`` is the set-point k + 1 steps before ``setpoint``.
+    """
+    if m.has_dynamics == 0:
+        return setpoint
+    after = motion
+    # New vectors: changing entries of a copied one loses gradients in Warp.
+    position = vec9()
+    rate = vec9()
+    for i in range(9):
+        k = subsystem(i)
+        steps = m.dead_steps[k]
+        begin = delay[environment, steps]
+        later_position = setpoint.position[i]
+        later_rate = setpoint.rate[i]
+        if steps > 0:
+            later = delay[environment, steps - 1]
+            later_position = later.position[i]
+            later_rate = later.rate[i]
+        if m.lags[k] == 0:
+            position[i] = later_position
+            rate[i] = later_rate
+        else:
+            y = lag(
+                m, i, motion.position[i], motion.rate[i], begin.position[i], begin.rate[i], later_rate, dt
+            )
+            position[i] = y[0]
+            rate[i] = y[1]
+    after.position = position
+    after.rate = rate
+    if m.lags[1] == 0 and m.dead_steps[1] == 0:
+        after.displacement = setpoint.displacement
+        after.velocity = setpoint.velocity
+        after.beta = setpoint.beta
+        after.beta_rate = setpoint.beta_rate
+        return after
+    return pose_from_legs(m, after, motion)

@@ -1,0 +1,1 @@
+"""Warp kernels of the simulator: step and simulator cues, observations, gradients."""

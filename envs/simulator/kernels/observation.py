@@ -1,0 +1,152 @@
+"""What a policy sees: one flat row an environment, in fixed physical scaling.
+
+Car cues now, cues felt, and the machine's state. The machine's rows are its set-points: what the limits act
+on and a controller steers; without actuator dynamics they are the true motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from ...arrays import real, vec3, vec9
+from ...cues import GRAVITY
+from ...platform.kernels.step import Machine, Motion
+from .step import Cues, State
+
+
+@dataclass(frozen=True)
+class Row:
+    """Some entries of an observation.
+
+    Args:
+        name: What they are.
+        size: How many.
+        scale: What one unit of the entry stands for, in ``unit``.
+        unit: SI unit.
+        meaning: For people.
+        bound: Greatest absolute value an environment's observation shows; what exceeds it is clipped.
+    """
+
+    name: str
+    size: int
+    scale: float
+    unit: str
+    meaning: str
+    bound: float = 10.0
+
+
+ROWS: Final = (
+    Row("wanted_force", 3, 10.0, "m/s^2", "car's specific force, gravity at rest taken off z"),
+    Row("wanted_rate", 3, 1.0, "rad/s", "car's angular velocity"),
+    Row("felt_force", 3, 10.0, "m/s^2", "specific force at the cab's reference point, as wanted_force"),
+    Row("felt_rate", 3, 1.0, "rad/s", "angular velocity of the cab"),
+    Row("carriage", 2, 10.0, "m", "carriage x, y"),
+    Row("carriage_rate", 2, 5.0, "m/s", "their rates"),
+    Row("displacement", 3, 1.0, "m", "hexapod x, y, z from neutral"),
+    Row("velocity", 3, 1.0, "m/s", "their rates"),
+    Row("beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw"),
+    Row("beta_rate", 3, 1.0, "rad/s", "their rates"),
+    Row("turntable", 2, 1.0, "1", "sine and cosine of the turntable's angle", 1.0),
+    Row("turntable_rate", 1, 1.0, "rad/s", "turntable rate"),
+    Row("legs", 6, 1.0, "1", "leg extensions over the limit they move towards", 1.0),
+    Row("leg_rates", 6, 1.0, "1", "leg speeds over their limit"),
+    Row("acceleration", 9, 10.0, "m/s^2, rad/s^2", "accelerations of the last step"),
+)
+"""The rows of an observation, in order."""
+
+OBSERVATION_SIZE: Final = sum(row.size for row in ROWS)
+"""Entries of an observation."""
+
+
+def _slices() -> dict[str, slice]:
+    ends = np.cumsum([row.size for row in ROWS])
+    return {row.name: slice(int(e) - row.size, int(e)) for row, e in zip(ROWS, ends, strict=True)}
+
+
+SLICES: Final = _slices()
+"""Where each row lies in an observation."""
+
+SCALES: Final = {row.name: row.scale for row in ROWS}
+"""What one unit of each row stands for, in its SI unit."""
+
+
+def read(observation: NDArray[Any], name: str) -> NDArray[np.float64]:
+    """A row of one or many observations in SI units, (..., size)."""
+    return np.asarray(observation[..., SLICES[name]] * SCALES[name], dtype=np.float64)
+
+
+@wp.func
+def put(out: wp.array2d(dtype=real), i: int, first: int, value: Any, size: int, scale: real) -> int:
+    """Write ``size`` entries from ``first`` on; returns where the next row begins."""
+    for k in range(size):
+        out[i, first + k] = value[k] / scale
+    return first + size
+
+
+@wp.func
+def share_of_limit(value: real, lower: real, upper: real) -> real:
+    """A position over the limit it moves towards, within [-1, 1]."""
+    if value >= real(0.0):
+        return value / wp.max(upper, real(1e-9))
+    return -value / wp.min(lower, real(-1e-9))
+
+
+@wp.func
+def write_observation(
+    m: Machine,
+    s: State,
+    p: Motion,
+    acceleration: vec9,
+    cues: Cues,
+    out: wp.array2d(dtype=real),
+    i: int,
+) -> int:
+    """One environment's observation, the rows in the order of :data:`ROWS`; returns its size.
+
+    ``p`` are the machine's set-points and ``acceleration`` its acceleration, in the frame to be seen in;
+    ``cues`` are those of the cab.
+    """
+    gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
+    one = real(1.0)
+    wanted = s.wanted.force + gravity
+    felt = cues.force + gravity
+    k = put(out, i, 0, wanted, 3, real(wp.static(SCALES["wanted_force"])))
+    k = put(out, i, k, s.wanted.rate, 3, one)
+    k = put(out, i, k, felt, 3, real(wp.static(SCALES["felt_force"])))
+    k = put(out, i, k, cues.rate, 3, one)
+    k = put(out, i, k, p.position, 2, real(wp.static(SCALES["carriage"])))
+    k = put(out, i, k, p.rate, 2, real(wp.static(SCALES["carriage_rate"])))
+    k = put(out, i, k, p.displacement, 3, one)
+    k = put(out, i, k, p.velocity, 3, one)
+    k = put(out, i, k, p.beta, 3, one)
+    k = put(out, i, k, p.beta_rate, 3, one)
+    out[i, k] = wp.sin(p.position[8])
+    out[i, k + 1] = wp.cos(p.position[8])
+    out[i, k + 2] = p.rate[8]
+    k = k + 3
+    for leg in range(6):
+        j = leg + 2
+        out[i, k + leg] = share_of_limit(p.position[j], m.position_min[j], m.position_max[j])
+        out[i, k + 6 + leg] = p.rate[j] / m.velocity[j]
+    return put(out, i, k + 12, acceleration, 9, real(wp.static(SCALES["acceleration"])))
+
+
+def observe_kernel(
+    machines: wp.array(dtype=Machine),
+    machine_of: wp.array(dtype=int),
+    state: wp.array(dtype=State),
+    out: wp.array2d(dtype=real),
+) -> None:
+    """Observation of every environment."""
+    i = wp.tid()
+    s = state[i]
+    write_observation(machines[machine_of[i]], s, s.setpoint, s.acceleration, s.felt, out, i)
+
+
+observe_forward = wp.kernel(observe_kernel, enable_backward=False, module="unique")
+"""The observation without its adjoint."""

@@ -1,0 +1,278 @@
+"""The state of one environment: what a batch holds a row of for each environment."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import warp as wp
+
+from ...arrays import real, vec3, vec9
+from ...perception.kernels import Sensed, Vestibular, VestibularState, advance_vestibular, rested, sense
+from ...platform.kernels.geometry import cab_angular_velocity, leg_extensions, specific_force
+from ...platform.kernels.step import Machine, Motion, SetPoint, actuate, command, mean_acceleration
+from ...settings import Positive, configuration
+
+
+@wp.struct
+class Cues:
+    """Specific force at the cab's reference point and at the head, and angular velocity; in F_S or F_A."""
+
+    force: vec3  # m/s^2
+    rate: vec3  # rad/s
+    head_force: vec3  # m/s^2
+
+
+@wp.struct
+class State:
+    """Everything that changes in one environment."""
+
+    sample: int  # index of the car's cue that is wanted now
+    setpoint: Motion  # limited commands
+    motion: Motion  # the true machine: the set-point after dead time and lag
+    acceleration: vec9  # of the true machine over the last step, in the order of AXES
+    setpoint_acceleration: vec9  # of the set-points, likewise
+    limits: wp.uint64  # limits met in the last step, see platform.state.Step
+    wanted: Cues
+    felt: Cues
+    vestibular_wanted: VestibularState
+    vestibular_felt: VestibularState
+    sensed_wanted: Sensed
+    sensed_felt: Sensed
+
+
+@wp.struct
+class Drives:
+    """Cue traces of all drives, one behind another."""
+
+    force: wp.array(dtype=vec3)
+    rate: wp.array(dtype=vec3)
+    rate_derivative: wp.array(dtype=vec3)
+    first: wp.array(dtype=int)  # of each drive
+    length: wp.array(dtype=int)
+
+
+# The headline cost of a moment: how far what is felt lies from what is wanted, in indifference zones.
+
+
+@configuration
+class CueCost:
+    """|df|^2 / force^2 + |dw|^2 / rate^2, whose mean over time is J.
+
+    The defaults are the published indifference zone (Slob et al., Bosch Rexroth).
+
+    Args:
+        force: Error of specific force no driver minds, m/s^2.
+        rate: Error of angular velocity no driver minds, rad/s.
+    """
+
+    force: Positive = 0.6
+    rate: Positive = math.radians(3.0)
+
+
+@wp.struct
+class Zone:
+    """The kernel's form of :class:`CueCost`."""
+
+    force: real
+    rate: real
+
+
+def zone(cost: CueCost) -> Any:
+    """The kernel's form of a cost."""
+    values: Any = Zone()
+    values.force, values.rate = cost.force, cost.rate
+    return values
+
+
+@wp.func
+def error(z: Zone, force: vec3, wanted_force: vec3, rate: vec3, wanted_rate: vec3) -> real:
+    """The cost of a pair of signals."""
+    df = (force - wanted_force) / z.force
+    dw = (rate - wanted_rate) / z.rate
+    return wp.dot(df, df) + wp.dot(dw, dw)
+
+
+@wp.func
+def cue_error(z: Zone, s: State) -> real:
+    """The cost of what is felt at the cab's reference point."""
+    return error(z, s.felt.force, s.wanted.force, s.felt.rate, s.wanted.rate)
+
+
+@wp.func
+def perceived_error(z: Zone, s: State) -> real:
+    """The cost of what the driver senses."""
+    return error(z, s.sensed_felt.force, s.sensed_wanted.force, s.sensed_felt.rate, s.sensed_wanted.rate)
+
+
+# The step of one environment: machine, cues and perception. One definition serves every kernel.
+#
+# car cue -> policy -> **machine -> cues felt -> sensed**
+
+
+@wp.func
+def wanted_cues(m: Machine, drives: Drives, drive: int, sample: int) -> Cues:
+    """The car's cues at a sample of a drive (the last one after its end), the head as in the machine."""
+    i = drives.first[drive] + wp.clamp(sample, 0, drives.length[drive] - 1)
+    cues = Cues()
+    cues.force = drives.force[i]
+    cues.rate = drives.rate[i]
+    arm = m.head - m.cab
+    omega = cues.rate
+    cues.head_force = (
+        cues.force + wp.cross(drives.rate_derivative[i], arm) + wp.cross(omega, wp.cross(omega, arm))
+    )
+    return cues
+
+
+@wp.func
+def felt_cues(m: Machine, motion: Motion, acceleration: vec9) -> Cues:
+    """The cues of the true motion, Eqs. (1), (7), (40), at the cab's reference point and at the head."""
+    origin = vec3(acceleration[0] + acceleration[2], acceleration[1] + acceleration[3], acceleration[4])
+    beta_acceleration = vec3(acceleration[5], acceleration[6], acceleration[7])
+    psi_t = motion.position[8]
+    omega_t = motion.rate[8]
+    cues = Cues()
+    cues.force = specific_force(
+        m.cab, motion.beta, motion.beta_rate, beta_acceleration, psi_t, omega_t, acceleration[8], origin
+    )
+    cues.head_force = specific_force(
+        m.head, motion.beta, motion.beta_rate, beta_acceleration, psi_t, omega_t, acceleration[8], origin
+    )
+    cues.rate = cab_angular_velocity(motion.beta, motion.beta_rate, psi_t, omega_t)
+    return cues
+
+
+@wp.func
+def rest_motion(m: Machine, start: vec9) -> Motion:
+    """The machine at rest: carriage x, y; hexapod displacement and Euler angles; turntable angle."""
+    motion = Motion()
+    motion.displacement = vec3(start[2], start[3], start[4])
+    motion.beta = vec3(start[5], start[6], start[7])
+    legs = leg_extensions(m.geometry, motion.displacement, motion.beta)
+    motion.position = vec9(start[0], start[1], legs[0], legs[1], legs[2], legs[3], legs[4], legs[5], start[8])
+    return motion
+
+
+@wp.func
+def initial_state(m: Machine, v: Vestibular, drives: Drives, drive: int, sample: int, start: vec9) -> State:
+    """The machine at rest at ``start``, the driver at rest in it, the car at a sample of its drive."""
+    state = State()
+    state.sample = sample
+    state.motion = rest_motion(m, start)
+    state.setpoint = state.motion
+    state.wanted = wanted_cues(m, drives, drive, sample)
+    state.felt = felt_cues(m, state.motion, vec9())
+    state.vestibular_wanted = rested(v, state.wanted.head_force, state.wanted.rate)
+    state.vestibular_felt = rested(v, state.felt.head_force, state.felt.rate)
+    state.sensed_wanted = sense(v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate)
+    state.sensed_felt = sense(v, state.vestibular_felt, state.felt.head_force, state.felt.rate)
+    return state
+
+
+@wp.func
+def next_state(
+    m: Machine,
+    v: Vestibular,
+    drives: Drives,
+    drive: int,
+    delay: wp.array2d(dtype=SetPoint),
+    environment: int,
+    state: State,
+    action: vec9,
+    dt: real,
+) -> State:
+    """One step of one environment with nine accelerations."""
+    commanded = command(m, state.setpoint, action, dt)
+    motion = actuate(m, state.motion, delay, environment, commanded.motion, dt)
+    acceleration = mean_acceleration(state.motion, motion, dt)
+
+    after = State()
+    after.sample = state.sample + 1
+    after.setpoint = commanded.motion
+    after.limits = commanded.limits
+    after.motion = motion
+    after.acceleration = acceleration
+    after.setpoint_acceleration = mean_acceleration(state.setpoint, commanded.motion, dt)
+    after.wanted = wanted_cues(m, drives, drive, after.sample)
+    after.felt = felt_cues(m, motion, acceleration)
+    after.vestibular_wanted = advance_vestibular(
+        v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate
+    )
+    after.vestibular_felt = advance_vestibular(
+        v, state.vestibular_felt, state.felt.head_force, state.felt.rate
+    )
+    after.sensed_wanted = sense(v, after.vestibular_wanted, after.wanted.head_force, after.wanted.rate)
+    after.sensed_felt = sense(v, after.vestibular_felt, after.felt.head_force, after.felt.rate)
+    return after
+
+
+@wp.func
+def shift_delay(
+    delay: wp.array2d(dtype=SetPoint),
+    delay_out: wp.array2d(dtype=SetPoint),
+    environment: int,
+    setpoint: Motion,
+) -> int:
+    """Put the newest set-point before the earlier ones."""
+    newest = SetPoint()
+    newest.position = setpoint.position
+    newest.rate = setpoint.rate
+    delay_out[environment, 0] = newest
+    for k in range(1, delay.shape[1]):
+        delay_out[environment, k] = delay[environment, k - 1]
+    return 0
+
+
+def step_kernel(
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    dt: real,
+    state: wp.array(dtype=State),
+    delay: wp.array2d(dtype=SetPoint),
+    action: wp.array(dtype=vec9),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+) -> None:
+    """One step of every environment, out of place."""
+    i = wp.tid()
+    m = machines[machine_of[i]]
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, state[i], action[i], dt)
+    if m.has_dynamics != 0:
+        shift_delay(delay, delay_out, i, after.setpoint)
+    state_out[i] = after
+
+
+def reset_kernel(
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    sample: wp.array(dtype=int),
+    start: wp.array(dtype=vec9),
+    mask: wp.array(dtype=wp.bool),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+) -> None:
+    """Put the masked environments at rest at their start poses."""
+    i = wp.tid()
+    if not mask[i]:
+        return
+    m = machines[machine_of[i]]
+    state = initial_state(m, vestibular[0], drives, drive_of[i], sample[i], start[i])
+    state_out[i] = state
+    newest = SetPoint()
+    newest.position = state.setpoint.position
+    for k in range(delay_out.shape[1]):
+        delay_out[i, k] = newest
+
+
+step_forward = wp.kernel(step_kernel, enable_backward=False, module="unique")
+"""The step without its adjoint: compiles in seconds."""
+
+reset_forward = wp.kernel(reset_kernel, enable_backward=False, module="unique")
+"""The reset."""

@@ -1,0 +1,1 @@
+"""Warp kernels of the environment: actions, rewards, observations, episodes."""

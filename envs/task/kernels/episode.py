@@ -1,0 +1,198 @@
+"""The kernels of a batch: play a step, begin an episode, look. Everything is one launch, for all rows.
+
+action -> accelerations -> **machine, cues, perception** -> reward -> observation
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from ...arrays import real, vec9
+from ...perception.kernels import Vestibular
+from ...platform.kernels.step import Machine, SetPoint
+from ...simulator.kernels.observation import write_observation
+from ...simulator.kernels.step import Drives, State, next_state, shift_delay
+from .action import ActionScale, applied_accelerations, own_accelerations, take_action
+from .observation import Episode, Places, repeat_frame, shift_frames, write_frame
+from .reward import RewardScale, action_change, has_failed, terms_now, vec_terms
+
+CORE = wp.constant(1)
+FRAME = wp.constant(2)
+"""Parts of an observation: the fixed rows in full precision, and the frame in float32."""
+
+
+@wp.struct
+class Rules:
+    """What is the same for the whole batch."""
+
+    action: ActionScale
+    reward: RewardScale
+    places: Places
+    share: real  # of a time step in an action
+    dt: real  # time step, s
+
+
+@wp.struct
+class Command:
+    """What an environment's actions have asked for."""
+
+    own: vec9  # the accelerations of the action itself, in its frame
+    asked: vec9  # what the axes are told, with the base policy's, in the machine's frame
+    clipped: int  # entries of the action outside [-1, 1]
+
+
+@wp.struct
+class Arrays:
+    """What a batch holds a row of for each environment, beside the simulator's state."""
+
+    episode: wp.array(dtype=Episode)
+    begins: wp.array(dtype=wp.bool)
+    action: wp.array2d(dtype=wp.float32)
+    now: wp.array2d(dtype=wp.float32)  # the clipped action
+    before: wp.array2d(dtype=wp.float32)  # the one before
+    base: wp.array(dtype=vec9)
+    command: wp.array(dtype=Command)
+    terms: wp.array(dtype=vec_terms)
+    reward: wp.array(dtype=real)
+    terminated: wp.array(dtype=wp.bool)
+    truncated: wp.array(dtype=wp.bool)
+    core: wp.array2d(dtype=real)
+    fixed: wp.array2d(dtype=real)  # the fixed rows in the observation's frame
+    memory: wp.array2d(dtype=wp.float32)  # low-passed cues of every sample of every drive
+    bounds: wp.array(dtype=wp.float32)  # of an observation's entries
+    observation: wp.array2d(dtype=wp.float32)
+
+
+@wp.func
+def commanded(rules: Rules, a: Arrays, which: int, s: State, i: int, first: int) -> vec9:
+    """Accelerations of a time step, the first of an action or a later one."""
+    c = a.command[i]
+    if first != 0:
+        c.clipped = take_action(a.action, a.now, a.before, i)
+    c.own = own_accelerations(rules.action, which, s.setpoint, a.now, i, c.own, rules.dt)
+    c.asked = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
+    a.command[i] = c
+    return wp.cw_mul(c.asked, a.episode[i].actuator_gain)
+
+
+@wp.func
+def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> int:
+    """Terms, reward and ends after a time step; terms are means over the time steps of an action."""
+    terms = terms_now(rules.reward, m, s, rules.share)
+    ended = bool(False)
+    if first != 0:
+        terms[6] = action_change(a.now, a.before, i)
+    else:
+        terms = terms + a.terms[i]
+        ended = a.terminated[i]
+    if rules.reward.terminate != 0 and not ended and has_failed(s.limits):
+        terms[7] = real(1.0)
+        ended = bool(True)
+    a.terms[i] = terms
+    a.reward[i] = -wp.dot(rules.reward.weights, terms)
+    a.terminated[i] = ended
+    a.truncated[i] = s.sample >= a.episode[i].last
+    return 0
+
+
+@wp.func
+def look_at(
+    rules: Rules,
+    a: Arrays,
+    drives: Drives,
+    drive: int,
+    which: int,
+    m: Machine,
+    s: State,
+    i: int,
+    parts: int,
+) -> int:
+    """Write the observation of an environment, or parts of it."""
+    if parts & CORE:
+        write_observation(m, s, s.setpoint, s.acceleration, s.felt, a.core, i)
+    if parts & FRAME:
+        command = a.command[i]
+        shift_frames(a.observation, i, rules.places.frame)
+        write_frame(
+            rules.places,
+            drives,
+            drive,
+            a.episode[i],
+            which,
+            m,
+            s,
+            a.fixed,
+            a.now,
+            command.own,
+            a.base[i],
+            a.memory,
+            a.bounds,
+            a.observation,
+            i,
+        )
+    return 0
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def play(
+    rules: Rules,
+    a: Arrays,
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    first: int,
+    parts: int,
+    state: wp.array(dtype=State),
+    delay: wp.array2d(dtype=SetPoint),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+) -> None:
+    """One time step: ``first`` says whether an action begins, ``parts`` what of the observation is made."""
+    i = wp.tid()
+    which = machine_of[i]
+    m = machines[which]
+    s = state[i]
+    acceleration = commanded(rules, a, which, s, i, first)
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, acceleration, rules.dt)
+    if m.has_dynamics != 0:
+        shift_delay(delay, delay_out, i, after.setpoint)
+    state_out[i] = after
+    judge(rules, a, m, after, i, first)
+    look_at(rules, a, drives, drive_of[i], which, m, after, i, parts)
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def look(
+    rules: Rules,
+    a: Arrays,
+    machines: wp.array(dtype=Machine),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    only_begins: int,
+    parts: int,
+    state: wp.array(dtype=State),
+) -> None:
+    """Observations outside of a step; frames begin anew where an episode ``begins``."""
+    i = wp.tid()
+    begins = a.begins[i]
+    if only_begins != 0 and not begins:
+        return
+    which = machine_of[i]
+    look_at(rules, a, drives, drive_of[i], which, machines[which], state[i], i, parts)
+    if begins and parts & FRAME:
+        repeat_frame(a.observation, i, rules.places.frame)
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def forget(a: Arrays) -> None:
+    """Nothing has been asked for where an episode begins."""
+    i = wp.tid()
+    if not a.begins[i]:
+        return
+    for k in range(a.now.shape[1]):
+        a.now[i, k] = wp.float32(0.0)
+        a.before[i, k] = wp.float32(0.0)
+    a.command[i] = Command()

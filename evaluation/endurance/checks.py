@@ -1,0 +1,285 @@
+"""Legs of a hexapod's pose, in NumPy and on its own: what the machine's step computes is checked with it.
+
+A leg is l = L_IH A - B + S_0 + s, Eq. (12), and its length changes at l . (ds/dt + omega x L_IH A) / |l|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...envs.arrays import FLOAT
+from ...envs.platform import Platform, actuator_limits
+from ...envs.platform.kernels.step import LEGS
+from ...envs.platform.machines import Hexapod
+from ...envs.simulator.simulator import Simulator
+from ..metrics import Criteria, cue_error
+from .batch_drivers import BatchDriver
+from .results import Endured
+
+Floats = NDArray[np.float64]
+Vector = list[Floats]
+"""Three components."""
+
+
+class Legs(NamedTuple):
+    """Legs of n poses.
+
+    Args:
+        extension: (n, 6) from neutral, m.
+        rate: (n, 6) m/s.
+        clearance: (n,) det of the Jacobian over that at neutral: 0 in a singular pose, negative behind it.
+    """
+
+    extension: Floats
+    rate: Floats
+    clearance: Floats
+
+
+def legs_of(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> Legs:
+    """Legs of poses; of those that are not finite, not a number.
+
+    Args:
+        hexapod: With its joints.
+        pose: (n, 6) displacement from neutral, m; roll, pitch, yaw, rad.
+        pose_rate: (n, 6) their rates.
+    """
+    with np.errstate(invalid="ignore"):
+        length, rate, determinant = _legs(hexapod, pose, pose_rate)
+    neutral, _, at_neutral = _legs(hexapod, np.zeros((1, 6)), np.zeros((1, 6)))
+    return Legs(length - neutral, rate, determinant / at_neutral)
+
+
+def _legs(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> tuple[Floats, Floats, Floats]:
+    """Lengths, rates, and the determinant of the Jacobian."""
+    upper, lower = np.array(hexapod.upper_joints), np.array(hexapod.lower_joints)
+    # Vectors of three arrays (6, n): their sums and products are those of long rows.
+    angles = np.ascontiguousarray(pose[:, 3:].T)
+    origin = (np.array(hexapod.neutral) + pose[:, :3]).T
+    arm = [upper @ row for row in _rotation(angles)]
+    leg = [arm[k] + origin[k] - lower[:, k, None] for k in range(3)]
+    turning = _cross(_angular_velocity(angles, pose_rate[:, 3:].T), arm)
+    length = np.sqrt(leg[0] ** 2 + leg[1] ** 2 + leg[2] ** 2)
+    direction = [component / length for component in leg]
+    rate = sum(direction[k] * (turning[k] + pose_rate[:, k]) for k in range(3))
+    jacobian = np.array([*direction, *_cross(arm, direction)])
+    determinant: Floats = np.linalg.det(jacobian.transpose(2, 1, 0))
+    return length.T, np.asarray(rate).T, determinant
+
+
+def _rotation(angles: Floats) -> Floats:
+    """(3, 3, n) Rx(roll) Ry(pitch) Rz(yaw), Eq. (4)."""
+    (sp, st, ss), (cp, ct, cs) = np.sin(angles), np.cos(angles)
+    return np.array(
+        [
+            [ct * cs, -ct * ss, st],
+            [cp * ss + sp * st * cs, cp * cs - sp * st * ss, -sp * ct],
+            [sp * ss - cp * st * cs, sp * cs + cp * st * ss, cp * ct],
+        ]
+    )
+
+
+def _angular_velocity(angles: Floats, rates: Floats) -> Vector:
+    """In inertial axes: roll turns about x, pitch about Rx y, yaw about Rx Ry z."""
+    (sp, st, _), (cp, ct, _) = np.sin(angles), np.cos(angles)
+    roll, pitch, yaw = rates
+    return [roll + st * yaw, cp * pitch - sp * ct * yaw, sp * pitch + cp * ct * yaw]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+# Whether a machine's true motion keeps its limits, told from the motion alone: the limiter is not asked.
+
+
+KINDS: Final = ("position", "rate", "acceleration", "pose", "number")
+"""What can be exceeded: an actuator's travel, speed or acceleration; a pose, which its legs must hold and
+which must not be singular; and numbers, where the motion is not finite."""
+
+TOLERANCE: Final = 1e-6 if FLOAT is np.float64 else 1e-2
+"""Of each limit, relative, for rounding; legs may differ from their pose by as much, m."""
+
+_LIMITED: Final = ("position", "rate", "acceleration")
+
+
+class TrueLimits:
+    """Holds motion against a machine's own numbers, batch by batch in the order of time.
+
+    Actuators of the hexapod are not taken from the machine's step, but computed from the pose it came to.
+
+    Args:
+        platform: The machine; lag and dead time make no difference.
+        n: Environments.
+        dt: Time step, s.
+    """
+
+    def __init__(self, platform: Platform, n: int, dt: float) -> None:
+        self._hexapod, self._dt = platform.hexapod, dt
+        limits = actuator_limits(platform)
+        self._low, self._high = limits["position_min"], limits["position_max"]
+        self._speed, self._acceleration = limits["velocity"], limits["acceleration"]
+        self._before: Floats = np.zeros((0, n, 9))
+        self.use = dict.fromkeys(_LIMITED, 0.0)
+        self.clearance = 1.0
+
+    def exceeded(self, motion: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
+        """(steps, n) whether each of :data:`KINDS` is exceeded.
+
+        Keeps the largest ``use`` of a limit, which is 1, and the least ``clearance`` of singular poses, both
+        where they are finite.
+
+        Args:
+            motion: (steps, n) rows of ``envs.platform.kernels.step.Motion``; they follow those of the
+            last call.
+        """
+        position, rate, told, clearance = self._actuators(motion)
+        change = np.diff(np.concatenate([self._before, rate]), axis=0) / self._dt
+        # A machine that begins has come from rest.
+        change = np.concatenate([np.zeros((len(rate) - len(change), *rate.shape[1:])), change])
+        self._before = rate[-1:].copy()
+        ends = np.where(position < 0.0, -self._low, self._high)
+        kept = {
+            "position": self._keeps("position", position, ends, self._high - self._low),
+            "rate": self._keeps("rate", rate, self._speed, self._speed),
+            "acceleration": self._keeps("acceleration", change, self._acceleration, self._acceleration),
+            "pose": (np.abs(position[..., LEGS] - told) <= TOLERANCE).all(axis=-1) & (clearance > 0.0),
+            "number": np.isfinite(position).all(axis=-1) & np.isfinite(rate).all(axis=-1),
+        }
+        self.clearance = float(np.min(clearance, initial=self.clearance, where=np.isfinite(clearance)))
+        return {name: np.logical_not(flags) for name, flags in kept.items()}
+
+    def _keeps(self, name: str, values: Floats, limit: Floats, scale: Floats) -> NDArray[np.bool_]:
+        """(steps, n) whether all actuators keep a limit; what is not a number keeps none."""
+        size = np.abs(values)
+        share = np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0)
+        self.use[name] = float(np.max(share, initial=self.use[name], where=np.isfinite(share)))
+        return np.asarray((size <= limit + TOLERANCE * scale).all(axis=-1))
+
+    def _actuators(self, motion: NDArray[Any]) -> tuple[Floats, Floats, Floats, Floats]:
+        """Positions and rates (steps, n, 9), legs of the step (steps, n, 6), clearance (steps, n)."""
+        shape, rows = motion.shape, motion.reshape(-1)
+        position, rate = (np.array(rows[name], dtype=np.float64) for name in ("position", "rate"))
+        told = position[:, LEGS].copy()
+        pose = np.hstack([rows["displacement"], rows["beta"]]).astype(np.float64)
+        pose_rate = np.hstack([rows["velocity"], rows["beta_rate"]]).astype(np.float64)
+        legs = legs_of(self._hexapod, pose, pose_rate)
+        position[:, LEGS], rate[:, LEGS] = legs.extension, legs.rate
+        return (
+            position.reshape(*shape, 9),
+            rate.reshape(*shape, 9),
+            told.reshape(*shape, 6),
+            legs.clearance.reshape(shape),
+        )
+
+
+# What happens in a batch of drives: errors of the cues, use of limits, and limits exceeded.
+
+
+_ROWS: Final = 8192
+"""Time steps of drives that are looked at together: some ten megabytes."""
+
+_CHANNELS: Final = (("wanted", "felt", "cue_error"), ("sensed_wanted", "sensed_felt", "perceived_cue_error"))
+
+
+class Watch:
+    """Looks at the states of a simulator, a block of time steps at a time.
+
+    Args:
+        simulator: With the drives.
+        platform: The machine, whose limits count.
+    """
+
+    def __init__(self, simulator: Simulator, platform: Platform) -> None:
+        self._simulator, n = simulator, simulator.n
+        self._rows = np.zeros((max(1, _ROWS // n), n), dtype=simulator.state.dtype)
+        self._filled, self._criteria = 0, Criteria()
+        self.limits = TrueLimits(platform, n, simulator.dt)
+        self.samples = 0
+        self.at_limit = np.zeros(n, dtype=np.int64)
+        self.beyond = np.zeros(n, dtype=np.int64)
+        self.exceeded = {kind: np.zeros(n, dtype=np.int64) for kind in KINDS}
+        self.errors = {name: np.zeros(n) for _, _, name in _CHANNELS}
+
+    def note(self) -> bool:
+        """Take the state now; returns whether a block is full and was looked at."""
+        # As bytes, which NumPy copies at once; structures it copies field by field.
+        self._rows[self._filled].view(np.uint8)[...] = self._simulator.state.view(np.uint8)
+        self._filled += 1
+        if self._filled < len(self._rows):
+            return False
+        self.look()
+        return True
+
+    def look(self) -> None:
+        """Look at what was noted since the last time."""
+        rows, self._filled = self._rows[: self._filled], 0
+        if not len(rows):
+            return
+        self.samples += len(rows)
+        self.at_limit += np.count_nonzero(rows["limits"], axis=0)
+        found = self.limits.exceeded(rows["motion"])
+        for kind, flags in found.items():
+            self.exceeded[kind] += flags.sum(axis=0)
+        self.beyond += np.any(list(found.values()), axis=0).sum(axis=0)
+        for wanted, felt, name in _CHANNELS:
+            self.errors[name] += self._errors(rows[wanted], rows[felt])
+
+    def _errors(self, wanted: NDArray[Any], felt: NDArray[Any]) -> Floats:
+        """(n,) sums over the block."""
+        error = cue_error(_cues(wanted), _cues(felt), self._criteria)
+        return np.asarray(error.reshape(wanted.shape).sum(axis=0))
+
+
+def _cues(side: NDArray[Any]) -> Floats:
+    """(rows, 6) specific force and angular velocity."""
+    flat = side.reshape(-1)
+    return np.hstack([flat["force"], flat["rate"]]).astype(np.float64)
+
+
+def watched(
+    driver: BatchDriver, platform: Platform, tell: Callable[[int], None] = lambda steps: None
+) -> tuple[list[Endured], dict[str, float]]:
+    """Drive drives of one length to their end.
+
+    Args:
+        driver: At rest at the first sample.
+        platform: The machine as it should be.
+        tell: Called now and then with the time steps done since; what it raises ends the drive.
+
+    Returns:
+        What came of each drive, and of all: the largest use of each limit and the least clearance of
+        singular poses.
+    """
+    watch = Watch(driver.simulator, platform)
+    steps, told = len(driver.simulator.drives[0]) - 1, 0
+    watch.note()
+    for k, _ in zip(range(1, steps + 1), driver.steps(), strict=False):
+        if watch.note():
+            tell(k - told)
+            told = k
+    watch.look()
+    tell(steps - told)
+    return _outcomes(watch, driver.not_finite), {**watch.limits.use, "clearance": watch.limits.clearance}
+
+
+def _outcomes(watch: Watch, not_finite: NDArray[np.int64]) -> list[Endured]:
+    return [
+        Endured(
+            samples=watch.samples,
+            **{name: _mean(total[i], watch.samples) for name, total in watch.errors.items()},
+            at_limit=float(watch.at_limit[i] / watch.samples),
+            beyond=int(watch.beyond[i]),
+            exceeded={kind: int(counts[i]) for kind, counts in watch.exceeded.items()},
+            actions_not_finite=int(not_finite[i]),
+        )
+        for i in range(len(not_finite))
+    ]
+
+
+def _mean(total: float, samples: int) -> float | None:
+    return float(total / samples) if np.isfinite(total) else None

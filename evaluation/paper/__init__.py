@@ -1,0 +1,1 @@
+"""The paper's six cases, its figures and its statements."""

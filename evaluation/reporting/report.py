@@ -1,0 +1,90 @@
+"""One HTML page with everything: it embeds its figures and needs no network."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+from jinja2 import Environment, StrictUndefined
+
+from ...envs.settings import to_dict
+from ...envs.storage import write_text
+from ..benchmark import ladder_table
+from ..results import Results
+from .tables import (
+    axis_table,
+    machine_table,
+    maneuver_table,
+    matrix_table,
+    notes_table,
+    share_table,
+    standings_table,
+)
+
+_DARKEST: Final = 0.35
+"""Opacity of the best cell of a row."""
+
+
+def render(results: Results, figures: Mapping[str, bytes], ladder: bytes | None = None) -> str:
+    """The page.
+
+    Args:
+        results: What to report.
+        figures: PNG by maneuver; those missing are left out.
+        ladder: PNG of the ladder.
+    """
+    source = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    configuration = {"criteria": to_dict(results.criteria), **results.provenance.configuration}
+    return environment.from_string(source).render(
+        results=results,
+        standings=standings_table(results),
+        ladder=ladder_table(results),
+        ladder_image=_embedded(ladder),
+        matrix=matrix_table(results),
+        shares=share_table(results),
+        heat=_heat(results),
+        parts=[_part(results, name, figures.get(name)) for name in results.maneuvers],
+        configuration=yaml.safe_dump(configuration, sort_keys=False, allow_unicode=True),
+    )
+
+
+def save_report(
+    results: Results, figures: Mapping[str, bytes], path: str | Path, ladder: bytes | None = None
+) -> None:
+    """Write the page, whole or not at all."""
+    write_text(path, render(results, figures, ladder))
+
+
+def _embedded(image: bytes | None) -> str | None:
+    return base64.b64encode(image).decode("ascii") if image else None
+
+
+def _part(results: Results, maneuver: str, figure: bytes | None) -> dict[str, Any]:
+    drives = results.maneuvers[maneuver]
+    return {
+        "name": maneuver,
+        "headline": maneuver_table(maneuver, drives, results.shares.get(maneuver)),
+        "verdict": next(verdict for verdict in results.verdicts if verdict.maneuver == maneuver),
+        "axes": axis_table(maneuver, drives),
+        "machine": machine_table(maneuver, drives),
+        "notes": notes_table(maneuver, results.notes.get(maneuver, {})),
+        "image": _embedded(figure),
+    }
+
+
+def _heat(results: Results) -> list[list[float | None]]:
+    """Opacity of each cell of the matrix: best over own J, so that the best is darkest."""
+    shades: list[list[float | None]] = []
+    for drives in results.maneuvers.values():
+        errors = {name: metrics.cue_error for name, metrics in drives.items()}
+        best = min(errors.values())
+        row = [errors.get(name) for name in results.policies]
+        shades.append([None if j is None else round(_DARKEST * (best / j if j else 1.0), 3) for j in row])
+    return shades

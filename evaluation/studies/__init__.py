@@ -1,0 +1,1 @@
+"""Policies under several conditions: other machines, lag, noise and other disturbances."""

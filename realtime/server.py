@@ -1,0 +1,210 @@
+"""A UDP socket that is waited on until a deadline, to the microsecond."""
+
+from __future__ import annotations
+
+import ipaddress
+import select
+import socket
+import time
+from collections.abc import Callable
+from typing import Final
+
+from ..envs.errors import ConfigurationError
+from .controller import Controller
+from .inbox import Address
+from .packets import LARGEST, NO_SEQUENCE, Format
+from .timing import Histogram, Pace
+
+_SPIN: Final = 100_000
+"""Before a deadline, ns, in which the socket is asked again and again: the system wakes nobody so exactly."""
+
+_MOST_WAITING: Final = 32
+"""Datagrams that are taken after the deadline: a flood must not stop the clock."""
+
+
+class Endpoint:
+    """Sends and receives datagrams; what the network refuses is lost, as datagrams are.
+
+    Args:
+        address: Host and port to listen at; port 0 for any that is free.
+
+    Attributes:
+        address: Host and port it listens at.
+        unsent: Datagrams the network refused.
+
+    Raises:
+        ConfigurationError: the address is none of this machine's, or taken.
+    """
+
+    def __init__(self, address: Address) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(address)
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise ConfigurationError(
+                f"{address[0]}:{address[1]} cannot be listened at ({error}); name another host or port"
+            ) from None
+        self._socket.setblocking(False)
+        self.address: Address = self._socket.getsockname()
+        self.unsent = 0
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._socket.close()
+
+    def send(self, data: bytes, to: Address) -> None:
+        """Send a datagram."""
+        try:
+            self._socket.sendto(data, to)
+        except OSError:
+            self.unsent += 1
+
+    def listen(
+        self,
+        deadline: int,
+        take: Callable[[bytes, Address, int], object],
+        clock: Callable[[], int] = time.perf_counter_ns,
+    ) -> None:
+        """Receive until a deadline, ns; after it, what has come already, but not without end.
+
+        Args:
+            deadline: Of the clock.
+            take: Given each datagram, who sent it, and when it came, ns.
+            clock: Nanoseconds now.
+        """
+        waiting = 0
+        while True:
+            now = clock()
+            try:
+                data, sender = self._socket.recvfrom(LARGEST + 1)
+            except OSError:
+                if now >= deadline:
+                    return
+                if deadline - now > _SPIN:
+                    select.select([self._socket], [], [], 1e-9 * (deadline - now - _SPIN))
+                continue
+            take(data, sender, now)
+            waiting += now >= deadline
+            if waiting >= _MOST_WAITING:
+                return
+
+
+def address_of(text: str, port: int) -> Address:
+    """Host and port of ``HOST`` or ``HOST:PORT``.
+
+    Args:
+        text: A name or IPv4 address.
+        port: Where none is said.
+
+    Raises:
+        ConfigurationError: there is no host, or none of this name, or the port is no number from 0 to 65535.
+    """
+    host, colon, said = text.partition(":")
+    if colon and not (said.isascii() and said.isdigit()):
+        raise ConfigurationError(f"{text}: a port is a number, as in 127.0.0.1:{port}")
+    if not host:
+        # The system would take it for 0.0.0.0, every address of this machine.
+        raise ConfigurationError(f"{text!r}: name a host, as in 127.0.0.1:{port}")
+    number = int(said) if colon else port
+    if number > 65535:
+        raise ConfigurationError(f"{text}: a port is at most 65535")
+    try:
+        return socket.gethostbyname(host), number
+    except (OSError, UnicodeError):
+        raise ConfigurationError(f"{text}: there is no host {host!r}") from None
+
+
+def is_loopback(address: Address) -> bool:
+    """Whether only programs of this machine reach an address."""
+    return ipaddress.ip_address(address[0]).is_loopback
+
+
+# The controller in real time: a period a millisecond, packets in between.
+
+
+_NS: Final = 1e-9
+
+
+class Server:
+    """Runs a controller at the times of a pace.
+
+    Args:
+        controller: The controller.
+        endpoint: Where packets come and set-points go.
+        form: How set-points are written.
+        rate: Periods a second.
+        lead: How long before its first period a time step is decided, s.
+        clock: Nanoseconds now, as of the endpoint.
+
+    Attributes:
+        timings: By name: "latency" from the arrival of cues until the first set-point they moved is sent;
+            "interval" between set-points, as its deviation from the period; "wake" from a period's time to
+            its begin; "period" from there until its set-point is sent; "decision" a step of policy and
+            machine.
+        duration: Of the run, s.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        endpoint: Endpoint,
+        form: Format,
+        rate: int,
+        lead: float,
+        clock: Callable[[], int] = time.perf_counter_ns,
+    ) -> None:
+        self._controller, self._endpoint, self._form, self._rate = controller, endpoint, form, rate
+        self._clock = clock
+        self._lead = round(1e9 * min(lead, 1.0 / rate))
+        names = ("latency", "wake", "interval", "period", "decision")
+        self.timings = {name: Histogram() for name in names}
+        self.pace = Pace(rate, clock)
+        self.duration = 0.0
+        self._sent = 0
+        self._answered = NO_SEQUENCE
+
+    def run(self, ends: Callable[[float], bool]) -> None:
+        """Go on until the controller has come home after it was stopped.
+
+        Args:
+            ends: Given the seconds since the begin, before each step: whether it is to be stopped.
+        """
+        controller, clock = self._controller, self._clock
+        self.pace = pace = Pace(self._rate, clock)
+        begin = clock()
+        while not controller.finished:
+            if controller.decides:
+                self._endpoint.listen(pace.deadline - self._lead, self._take)
+                if ends(_NS * (clock() - begin)):
+                    controller.stop()
+                self._decide()
+            self._endpoint.listen(pace.deadline, self._take)
+            self._period(pace.deadline)
+            pace.done()
+        self.duration = _NS * (clock() - begin)
+
+    def _decide(self) -> None:
+        began = self._clock()
+        self._controller.decide(_NS * began)
+        self.timings["decision"].add(self._clock() - began)
+
+    def _take(self, data: bytes, sender: Address, now: int) -> None:
+        self._controller.inbox.take(data, sender, _NS * now)
+
+    def _period(self, deadline: int) -> None:
+        began = self._clock()
+        setpoint = self._controller.period(_NS * began)
+        sender = self._controller.inbox.sender
+        if sender is not None:
+            self._endpoint.send(self._form.pack_setpoint(setpoint), sender)
+        sent = self._clock()
+        timings = self.timings
+        timings["wake"].add(began - deadline)
+        timings["period"].add(sent - began)
+        if self._sent:
+            timings["interval"].add(abs(sent - self._sent - 1_000_000_000 // self._rate))
+        if setpoint.echo not in (NO_SEQUENCE, self._answered):
+            timings["latency"].add(sent - round(1e9 * setpoint.received))
+            self._answered = setpoint.echo
+        self._sent = sent

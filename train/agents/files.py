@@ -1,0 +1,249 @@
+"""How an agent was made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from ...baselines.washout import WashoutParameters
+from ...envs.errors import ConfigurationError, DataError
+from ...envs.platform.machines import Platform
+from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
+from ...envs.storage import write_bytes
+from ...envs.task.drives import platform_of
+from ...envs.task.options import TaskOptions
+from .network import Activation, Network, Squash
+
+
+@configuration
+class Record:
+    """How an agent was made; everything that is needed to make it again.
+
+    Args:
+        algo: The algorithm.
+        seed: Of the training.
+        command: The command line.
+        steps: Actions taken in training, over all environments.
+        wall_time: Of the training, s.
+        hardware: The machine it was trained on.
+        versions: Of this package and the libraries, by name.
+        created: When, ISO 8601.
+        validation: J on the validation drives; None where it was not measured.
+        initial: How the agent was made that the training began with; None where it began anew.
+    """
+
+    algo: str
+    seed: int
+    command: str = ""
+    steps: int = 0
+    wall_time: NonNegative = 0.0
+    hardware: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    created: str = ""
+    validation: NonNegative | None = None
+    initial: Record | None = None
+
+
+# What stands in an agent's file: arrays by name, and the rest as plain values.
+
+
+Arrays = dict[str, NDArray[Any]]
+
+_MEAN: Final = "observation.mean"
+_VARIANCE: Final = "observation.variance"
+
+
+@configuration
+class Contents:
+    """Everything in an agent's file but its arrays.
+
+    Args:
+        name: Of the agent.
+        task: Its environment.
+        platform: The machine in full: a name in ``task`` may mean another one later.
+        record: How it was made.
+        activation: Of the network, as the following.
+        squash: Of its last layer.
+        skip: Whether the last layer sees the observation, too.
+        clip: Of the normalised observation.
+        layers: Of the network.
+        base: Washout under the agent.
+    """
+
+    name: str
+    task: TaskOptions
+    platform: Platform
+    record: Record
+    activation: Activation
+    squash: Squash
+    skip: bool
+    clip: Positive
+    layers: int
+    base: WashoutParameters | None = None
+
+
+def contents_of(
+    name: str, task: TaskOptions, network: Network, record: Record, base: WashoutParameters | None
+) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays by name, and plain values, of an agent."""
+    contents = Contents(
+        name=name,
+        task=task,
+        platform=platform_of(task),
+        record=record,
+        activation=network.activation,
+        squash=network.squash,
+        skip=network.skip,
+        clip=network.clip,
+        layers=len(network.weights),
+        base=base,
+    )
+    arrays: Arrays = {}
+    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        arrays[_weight(k)], arrays[_bias(k)] = weight, bias
+    if network.mean is not None and network.variance is not None:
+        arrays[_MEAN], arrays[_VARIANCE] = network.mean, network.variance
+    return arrays, to_dict(contents)
+
+
+def network_of(arrays: Mapping[str, NDArray[Any]], values: object, source: str) -> tuple[Contents, Network]:
+    """The contents and the network of a file.
+
+    Args:
+        arrays: By name.
+        values: Plain values.
+        source: Of both, for messages.
+
+    Raises:
+        DataError: an array is missing, too many or of the wrong shape.
+        ConfigurationError: a value is unknown, missing or out of range, or the machine is another one now.
+    """
+    contents = from_dict(Contents, values, source)
+    _check_platform(contents, source)
+    layers = range(contents.layers)
+    expected = {_weight(k) for k in layers} | {_bias(k) for k in layers}
+    normalised = {_MEAN, _VARIANCE} & arrays.keys()
+    if arrays.keys() - normalised != expected:
+        wrong = ", ".join(sorted((arrays.keys() - normalised) ^ expected))
+        raise DataError(f"{source}: arrays missing or unknown: {wrong}")
+    network = Network(
+        weights=tuple(arrays[_weight(k)] for k in layers),
+        biases=tuple(arrays[_bias(k)] for k in layers),
+        activation=contents.activation,
+        squash=contents.squash,
+        skip=contents.skip,
+        mean=arrays.get(_MEAN),
+        variance=arrays.get(_VARIANCE),
+        clip=contents.clip,
+    )
+    return contents, network
+
+
+def _check_platform(contents: Contents, source: str) -> None:
+    now, then = to_dict(platform_of(contents.task)), to_dict(contents.platform)
+    # Words about a machine may change, what it can do may not.
+    changed = [name for name in now if name != "description" and now[name] != then[name]]
+    if changed:
+        raise ConfigurationError(
+            f"{source}: the motion base {contents.platform.name!r} differs in {', '.join(changed)} "
+            "from the one the agent was trained on; use the version in its record, or train again"
+        )
+
+
+def _weight(k: int) -> str:
+    return f"layers.{k}.weight"
+
+
+def _bias(k: int) -> str:
+    return f"layers.{k}.bias"
+
+
+# An agent's file: safetensors with one entry of metadata, JSON with version and checksum.
+
+
+SUFFIX: Final = ".safetensors"
+
+FORMAT: Final = 1
+"""Version of the file; a reader refuses newer ones."""
+
+_KEY: Final = "motion-cueing-agent"
+_LENGTH: Final = 8
+"""Bytes of the header's length, before the header, which begins with a brace."""
+
+
+def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], values: Mapping[str, Any]) -> None:
+    """Write arrays and plain values, whole or not at all; the same contents give the same bytes."""
+    about = {"format": FORMAT, "sha256": checksum(arrays, values), "contents": values}
+    plain = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    # One entry: the library writes several in an order that changes.
+    write_bytes(path, save(plain, metadata={_KEY: json.dumps(about, sort_keys=True)}))
+
+
+def read(path: str | Path) -> tuple[dict[str, NDArray[Any]], Any]:
+    """Arrays and plain values of a file that :func:`write` wrote.
+
+    Raises:
+        DataError: the file is missing, broken, something else, or of a newer version.
+    """
+    _check_kind(path)
+    try:
+        with safe_open(path, framework="numpy") as file:
+            about = _about(path, file.metadata())
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (SafetensorError, TypeError, OverflowError) as error:
+        raise DataError(f"{path}: broken or cut off ({error}); copy or download it again") from None
+    if about["sha256"] != checksum(arrays, about["contents"]):
+        raise DataError(f"{path}: damaged, its checksum does not fit; copy or download it again")
+    return arrays, about["contents"]
+
+
+def checksum(arrays: Mapping[str, NDArray[Any]], values: Mapping[str, Any]) -> str:
+    """SHA-256 of everything in a file: the values as sorted JSON, then the arrays by name."""
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(json.dumps([name, array.dtype.str, array.shape]).encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _check_kind(path: str | Path) -> None:
+    try:
+        with open(path, "rb") as file:
+            head = file.read(_LENGTH + 1)
+    except FileNotFoundError:
+        raise DataError(f"agent {path}: there is no such file") from None
+    except OSError as error:
+        raise DataError(f"agent {path}: cannot be read ({error.strerror})") from None
+    if head[_LENGTH:] != b"{":
+        raise _foreign(path)
+
+
+def _about(path: str | Path, metadata: Mapping[str, str] | None) -> dict[str, Any]:
+    if not metadata or _KEY not in metadata:
+        raise _foreign(path)
+    try:
+        about = json.loads(metadata[_KEY])
+        version = int(about["format"])
+    except (ValueError, KeyError, TypeError):
+        raise DataError(f"{path}: damaged, its description is no JSON; copy or download it again") from None
+    if version > FORMAT:
+        raise DataError(
+            f"{path}: an agent of format {version}, this package reads {FORMAT}; update motion-cueing-gym"
+        )
+    if not {"sha256", "contents"} <= about.keys():
+        raise DataError(f"{path}: damaged, its checksum or contents are missing; copy or download it again")
+    return dict(about)
+
+
+def _foreign(path: str | Path) -> DataError:
+    return DataError(f"{path}: not an agent; expected a .safetensors file written by `motion-cueing train`")

@@ -1,0 +1,1 @@
+"""Learning algorithms, a folder each."""

@@ -1,0 +1,1 @@
+"""Analytic policy gradient: truncated backpropagation through time through the simulator."""

@@ -1,0 +1,1 @@
+"""Imitation of a controller by dataset aggregation (DAgger)."""

@@ -1,0 +1,1 @@
+"""The best linear washout for random drives, by CMA-ES."""

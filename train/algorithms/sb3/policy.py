@@ -1,0 +1,184 @@
+"""A policy of Stable-Baselines3 with the actor of :mod:`.actor`, so that it can begin with its weights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.distributions import DiagGaussianDistribution, Distribution
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import FlattenExtractor
+from stable_baselines3.common.vec_env import VecNormalize
+from torch import nn
+
+from ....envs.errors import DataError
+from ...agents import Network
+from ...networks import TORCH_ACTIVATIONS, Latent
+
+
+class _ActorAndCritic(nn.Module):
+    """What Stable-Baselines3 calls the extractor: hidden layers of actor and critic."""
+
+    def __init__(self, size: int, actor: Sequence[int], critic: Sequence[int], activation: str) -> None:
+        super().__init__()
+        self.policy_net = Latent(size, actor, activation)
+        self.value_net = Latent(size, critic, activation)
+        self.latent_dim_pi, self.latent_dim_vf = self.policy_net.size, self.value_net.size
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        latent: torch.Tensor = self.policy_net(features)
+        return latent
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        latent: torch.Tensor = self.value_net(features)
+        return latent
+
+
+class SkipPolicy(ActorCriticPolicy):
+    """Actor and critic whose last layers see the observation, too; the mean action goes through a tanh.
+
+    It takes the arguments of ``MlpPolicy``; ``net_arch`` is a list, or a mapping with ``pi`` and ``vf``.
+    """
+
+    def _build_mlp_extractor(self) -> None:
+        arch: Any = self.net_arch
+        actor, critic = (arch["pi"], arch["vf"]) if isinstance(arch, dict) else (arch, arch)
+        names = {kind: name for name, kind in TORCH_ACTIVATIONS.items()}
+        extractor: Any = _ActorAndCritic(self.features_dim, actor, critic, names[self.activation_fn])
+        self.mlp_extractor = extractor.to(self.device)
+
+    def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
+        # use_sde, which has another distribution, is refused in hyperparameters.py.
+        assert isinstance(self.action_dist, DiagGaussianDistribution)
+        return self.action_dist.proba_distribution(torch.tanh(self.action_net(latent_pi)), self.log_std)
+
+    @property
+    def hidden(self) -> list[nn.Module]:
+        """Hidden layers of the actor, with their activations."""
+        extractor: Any = self.mlp_extractor
+        return list(extractor.policy_net.hidden)
+
+
+# The deterministic policy of a Stable-Baselines3 model as a network that needs no PyTorch, and back.
+
+
+_NAMES = {module: name for name, module in TORCH_ACTIVATIONS.items()}
+
+
+def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> Network:
+    """``model.predict(deterministic=True)`` with the normalisation before it.
+
+    Args:
+        model: PPO, SAC, TD3, TQC, or another with their actor, on a flat observation.
+        normalize: The wrapper the model was trained in; its running mean and variance go into the network.
+
+    Raises:
+        DataError: the policy is not a chain of linear layers with one kind of activation.
+    """
+    layers, squash, skip = _actor(model)
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    mean, variance, clip = None, None, 10.0
+    if normalize is not None and normalize.norm_obs:
+        statistics: Any = normalize.obs_rms
+        mean, variance, clip = statistics.mean.copy(), statistics.var.copy(), float(normalize.clip_obs)
+    return Network(
+        weights=tuple(_numpy(layer.weight) for layer in linear),
+        biases=tuple(_numpy(layer.bias) for layer in linear),
+        activation=_activation(layers),  # type: ignore[arg-type]
+        squash="tanh" if squash else "clip",
+        skip=skip,
+        mean=mean,
+        variance=variance,
+        clip=clip,
+    )
+
+
+def load_network(
+    network: Network, model: BaseAlgorithm, normalize: VecNormalize | None, weight: float
+) -> None:
+    """Give a model the deterministic policy of a network.
+
+    Args:
+        network: Of a model built in the same way.
+        model: Its policy is changed, its critics stay as they are.
+        normalize: The wrapper around its environment; takes over mean and variance.
+        weight: Observations that mean and variance are counted for; new ones move them on.
+
+    Raises:
+        DataError: the network is built in another way.
+    """
+    layers, squash, skip = _actor(model)
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    ours = ([tuple(layer.weight.shape) for layer in linear], _activation(layers), squash, skip)
+    theirs = [w.shape for w in network.weights], network.activation, network.squash == "tanh", network.skip
+    if ours != theirs:
+        raise DataError(
+            "initial: the agent's network is built in another way; it has hidden layers "
+            f"{[w.shape[0] for w in network.weights[:-1]]} and activation {network.activation}"
+            f"{', its last layer also sees the observation' if network.skip else ''}, and ends with "
+            f"{network.squash}"
+        )
+    _load_statistics(network, normalize, weight)
+    with torch.no_grad():
+        for layer, values, bias in zip(linear, network.weights, network.biases, strict=True):
+            layer.weight.copy_(torch.from_numpy(values.copy()))
+            layer.bias.copy_(torch.from_numpy(bias.copy()))
+    target = getattr(model.policy, "actor_target", None)
+    if target is not None:
+        target.load_state_dict(model.policy.actor.state_dict())  # type: ignore[union-attr]
+
+
+def _load_statistics(network: Network, normalize: VecNormalize | None, weight: float) -> None:
+    normalized = normalize is not None and normalize.norm_obs
+    if normalized != (network.mean is not None):
+        wanted = "true" if network.mean is not None else "false"
+        raise DataError(f"initial: the agent was trained with normalize.observation {wanted}; set it so")
+    if normalize is not None and network.mean is not None and network.variance is not None:
+        statistics: Any = normalize.obs_rms
+        statistics.mean, statistics.var = network.mean.copy(), network.variance.copy()
+        statistics.count = weight
+
+
+def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
+    """Layers from the observation to the action; whether a tanh follows, and whether the last sees both."""
+    policy: Any = model.policy
+    actor = policy if isinstance(model, OnPolicyAlgorithm) else policy.actor
+    if not isinstance(actor.features_extractor, FlattenExtractor):
+        raise DataError("the policy's features extractor is not the plain one; it cannot become a network")
+    if isinstance(policy, SkipPolicy):
+        return [*policy.hidden, policy.action_net], True, True
+    if isinstance(model, OnPolicyAlgorithm):
+        return [*policy.mlp_extractor.policy_net, policy.action_net], bool(policy.squash_output), False
+    if hasattr(actor, "latent_pi"):
+        return [*_flat(actor.latent_pi), *_flat(actor.mu)], True, False
+    return _flat(actor.mu)[:-1], True, False
+
+
+def _flat(module: nn.Module) -> list[nn.Module]:
+    return list(module) if isinstance(module, nn.Sequential) else [module]
+
+
+def _activation(layers: Iterable[nn.Module]) -> str:
+    kinds = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
+    if not kinds:
+        return "tanh"
+    if len(kinds) > 1 or not kinds <= _NAMES.keys():
+        found = ", ".join(sorted(kind.__name__ for kind in kinds))
+        hint = "; with use_sde set policy_kwargs.clip_mean to 0" if nn.Hardtanh in kinds else ""
+        raise DataError(
+            f"the policy has layers {found}; a network has one of {', '.join(TORCH_ACTIVATIONS)}{hint}"
+        )
+    return _NAMES[kinds.pop()]
+
+
+def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:
+    array: NDArray[np.float32] = tensor.detach().cpu().numpy().copy()
+    return array

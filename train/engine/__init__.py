@@ -1,1 +1,0 @@
-"""Where trainings run: in this process, in processes of this machine, or on Ray."""

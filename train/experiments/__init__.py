@@ -1,0 +1,1 @@
+"""Many trainings: seeds, searches and populations, in processes or on Ray."""

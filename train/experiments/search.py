@@ -1,0 +1,258 @@
+"""What searches and populations vary: fields of a configuration by their path, and what they may be."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import optuna
+from optuna.trial import FrozenTrial, TrialState
+
+from ...envs.errors import ConfigurationError, DataError
+from ...envs.settings import from_dict, load, save, to_dict
+from ...envs.storage import write_text
+from ..config import Choice, TrainingConfig
+from ..run import free_folder
+from ..training import Status
+from .engines import Ending, Engine, Job, Listener
+from .jobs import JOURNAL, TrialJob, create_study, load_study
+
+
+def varied(config: TrainingConfig, values: Mapping[str, Any], **fields: Any) -> TrainingConfig:
+    """A configuration with other values, that varies nothing any more.
+
+    Args:
+        config: What is common.
+        values: By path, as ``hyperparameters.learning_rate``.
+        **fields: Other fields of the configuration.
+
+    Raises:
+        ConfigurationError: a path is unknown, or a value wrong there.
+    """
+    found = to_dict(replace(config, search={}, **fields))
+    for path, value in values.items():
+        _set(found, path, value)
+    return from_dict(TrainingConfig, found, "search")
+
+
+def check_space(config: TrainingConfig) -> None:
+    """Refuse a space with nothing in it, or whose ends are no configurations.
+
+    Raises:
+        ConfigurationError: there is nothing to vary, or a field cannot be set so.
+    """
+    if not config.search:
+        raise ConfigurationError("search is empty; name fields to vary, as hyperparameters.learning_rate")
+    ends: tuple[Callable[[Choice], Any], ...] = (first, last)
+    for end in ends:
+        varied(config, {path: end(choice) for path, choice in config.search.items()})
+
+
+def first(choice: Choice) -> Any:
+    """The first or smallest value."""
+    return choice.choices[0] if choice.choices else _number(choice, choice.low or 0.0)
+
+
+def last(choice: Choice) -> Any:
+    """The last or largest value."""
+    return choice.choices[-1] if choice.choices else _number(choice, choice.high or 0.0)
+
+
+def _number(choice: Choice, value: float) -> float | int:
+    return int(value) if choice.integer else value
+
+
+def _set(values: dict[str, Any], path: str, value: Any) -> None:
+    """Set a field by its path.
+
+    Raises:
+        ConfigurationError: the path does not lead through fields.
+    """
+    *parents, last_name = path.split(".")
+    for name in parents:
+        inner = values.setdefault(name, {})
+        if not isinstance(inner, dict):
+            raise ConfigurationError(f"search: {path!r} leads through {name!r}, which has no fields")
+        values = inner
+    values[last_name] = value
+
+
+# A search for hyperparameters: many short trainings, the hopeless ones broken off early.
+
+
+_CONFIG: Final = "config.yaml"
+_TABLE: Final = "results.csv"
+_BEST: Final = "best.yaml"
+_FINISHED: Final = (TrialState.COMPLETE, TrialState.PRUNED)
+
+
+class Search:
+    """A search in its folder; what is there already counts.
+
+    Args:
+        path: The folder.
+        config: What every training has in common; ``search`` says what they differ in.
+
+    Raises:
+        ConfigurationError: there is nothing to search, or a field cannot be set so.
+    """
+
+    def __init__(self, path: Path, config: TrainingConfig) -> None:
+        self.path, self.config = path, config
+        check_space(config)
+
+    @classmethod
+    def create(cls, path: Path | None, config: TrainingConfig) -> Search:
+        """A new search.
+
+        Raises:
+            ConfigurationError: the folder is not empty, or there is nothing to search.
+        """
+        search = cls(free_folder(path, f"{config.algo}-search"), config)
+        save(config, search.path / _CONFIG)
+        create_study(search.path)
+        return search
+
+    @classmethod
+    def open(cls, path: Path) -> Search:
+        """A search that was begun.
+
+        Raises:
+            DataError: there is none.
+        """
+        if not is_search(path):
+            raise DataError(f"--resume {path}: no search was begun there ({JOURNAL} is missing)")
+        return cls(path, load(TrainingConfig, path / _CONFIG))
+
+    def study(self) -> optuna.Study:
+        """The study; a session does not repeat what an earlier one drew."""
+        study = load_study(self.path)
+        entropy = (self.config.seed, len(study.trials))
+        seed = int(np.random.SeedSequence(entropy).generate_state(1)[0])
+        study.sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
+        return study
+
+    def run(self, trials: int, engine: Engine, listener: Listener) -> bool:
+        """Train until there are ``trials`` results; returns whether Ctrl-C stopped it.
+
+        Trials of a session that ended in the middle of them go on.
+        """
+        session = _Session(self, trials, listener)
+        try:
+            return engine.run(session.next_job, session)
+        finally:
+            self.report()
+
+    def job(self, trial: FrozenTrial | optuna.Trial, params: Mapping[str, Any]) -> TrialJob:
+        """The training of a trial."""
+        config = self._config_with(self._values(params))
+        return TrialJob(trial.number, trial._trial_id, self.path.resolve(), config)
+
+    def _values(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of what was drawn: of choices, Optuna is only told the place."""
+        return {
+            name: self.config.search[name].choices[found] if self.config.search[name].choices else found
+            for name, found in drawn.items()
+        }
+
+    def _config_with(self, values: Mapping[str, Any]) -> TrainingConfig:
+        """A trial's configuration."""
+        return varied(self.config, values, checkpoints=replace(self.config.checkpoints, keep=1))
+
+    def report(self) -> None:
+        """Write the table of all trials, and the configuration of the best."""
+        trials = load_study(self.path).get_trials(deepcopy=False)
+        names = list(self.config.search)
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(["trial", "state", "result", *names])
+        for trial in trials:
+            result = "" if trial.value is None else f"{trial.value:.6g}"
+            values = self._values(trial.params)
+            row = [values.get(name, "") for name in names]
+            table.writerow([trial.number, trial.state.name.lower(), result, *row])
+        write_text(self.path / _TABLE, text.getvalue())
+        best = self.best()
+        if best is not None:
+            config = self._config_with(self._values(best.params))
+            save(replace(config, checkpoints=self.config.checkpoints), self.path / _BEST)
+
+    def best(self) -> Any:
+        """The best trial, or None while there is none."""
+        trials = load_study(self.path).get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+        return min(trials, key=lambda trial: float(trial.value or 0.0)) if trials else None
+
+    @property
+    def best_config(self) -> Path:
+        """The best trial's configuration, for ``--config``."""
+        return self.path / _BEST
+
+
+class _Session:
+    """Draws trials for an engine, and notes what came of them."""
+
+    def __init__(self, search: Search, trials: int, listener: Listener) -> None:
+        self._search, self._listener = search, listener
+        self._study = search.study()
+        known = self._study.get_trials(deepcopy=False)
+        done = sum(trial.state in _FINISHED for trial in known)
+        self._left = max(0, trials - done)
+        self._begun = [trial for trial in known if trial.state is TrialState.RUNNING]
+        # A process that ended while one was drawn.
+        for trial in [trial for trial in self._begun if len(trial.params) < len(search.config.search)]:
+            self._study.tell(trial.number, state=TrialState.FAIL)
+            self._begun.remove(trial)
+
+    def next_job(self) -> TrialJob | None:
+        """The next trial's."""
+        if self._left == 0:
+            return None
+        self._left -= 1
+        if self._begun:
+            begun = self._begun.pop(0)
+            return self._search.job(begun, begun.params)
+        trial = self._study.ask()
+        for name, choice in self._search.config.search.items():
+            suggest(trial, name, choice)
+        return self._search.job(trial, trial.params)
+
+    def told(self, job: Job, status: Status) -> None:
+        """Pass on where a trial is."""
+        self._listener.told(job, status)
+
+    def ended(self, job: Job, ending: Ending) -> None:
+        """Note a result; one that was interrupted stays begun."""
+        assert isinstance(job, TrialJob)
+        self._listener.ended(job, ending)
+        tried = ending.result
+        if ending.error is not None:
+            self._study.tell(job.number, state=TrialState.FAIL)
+            print(f"{job.name}: failed ({ending.error})", flush=True)
+        elif not tried.interrupted:
+            state = TrialState.PRUNED if tried.value is None else TrialState.COMPLETE
+            self._study.tell(job.number, tried.value, state)
+            print(f"{job.name}: {_result(tried.value)}", flush=True)
+
+
+def is_search(path: Path) -> bool:
+    """Whether a folder is that of a search."""
+    return (path / JOURNAL).exists()
+
+
+def suggest(trial: optuna.Trial, name: str, choice: Choice) -> None:
+    """Draw a field; of choices, the place is drawn."""
+    if choice.choices:
+        trial.suggest_categorical(name, range(len(choice.choices)))
+    elif choice.integer:
+        trial.suggest_int(name, int(choice.low or 0), int(choice.high or 0), log=choice.log)
+    else:
+        trial.suggest_float(name, choice.low or 0.0, choice.high or 0.0, log=choice.log)
+
+
+def _result(value: float | None) -> str:
+    return "broken off" if value is None else f"{value:.4g}"
