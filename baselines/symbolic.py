@@ -181,9 +181,9 @@ def _joints(hexapod: Hexapod) -> list[tuple[Expression, Expression, float]]:
     return [(cs.DM(upper), cs.DM(neutral - np.array(lower)), float(length)) for upper, lower, length in parts]
 
 
-# A motion base in CasADi's symbols: the twin of the kernels in ``envs``, for controllers that optimise.
+# A motion base in CasADi's symbols: the twin of the kernels in ``envs``, for controllers that optimize.
 #
-# Kernels step a machine fast; an optimiser needs the same equations as expressions it can differentiate.
+# Kernels step a machine fast; an optimizer needs the same equations as expressions it can differentiate.
 # Nothing is simplified: both agree to round-off. Positions, rates and accelerations are columns of nine in
 # the order of ``AXES``: carriage x, y; hexapod x, y, z, roll, pitch, yaw; turntable; m and rad from neutral.
 
@@ -195,7 +195,7 @@ class SymbolicMachine:
     """Functions of one machine; each takes numbers or symbols, one column (9,) or many (9, n).
 
     Args:
-        platform: The machine. A missing subsystem is not left out: whoever optimises holds it still.
+        platform: The machine. A missing subsystem is not left out: whoever optimizes holds it still.
 
     Attributes:
         platform: The machine.

@@ -13,8 +13,8 @@ from motion_cueing.baselines.mpc.policy import make_controller
 from motion_cueing.baselines.mpc.prediction import (
     N_CUES,
     Grid,
-    Linearisation,
-    Linearised,
+    Linearization,
+    Linearized,
     cue_scales,
     make_grid,
 )
@@ -27,14 +27,14 @@ from motion_cueing.evaluation import rollout
 
 @dataclass(frozen=True)
 class Program:
-    """One program: minimise ``cost`` over the change of a plan, within ``bounds`` of the linearised rows.
+    """One program: minimize ``cost`` over the change of a plan, within ``bounds`` of the linearized rows.
 
     ``active`` are the rows that held in the plan before.
     """
 
     problem: Problem
     cost: Quadratic
-    about: Linearisation
+    about: Linearization
     bounds: Bounds
     plan: Plan
     wanted: np.ndarray
@@ -81,11 +81,11 @@ def _program(
 ) -> Program:
     platform = get_platform("paper")
     grid = make_grid(parameters.nodes)
-    linearised = Linearised(platform, len(grid.times), parameters.margins)
+    linearized = Linearized(platform, len(grid.times), parameters.margins)
     problem = Problem(platform, parameters, grid)
     plan = Plan(*grid.motion(position, rate, guess), guess)
-    about = linearised(plan.position, plan.rate, plan.acceleration)
-    bounds = problem.bounds(linearised.lower, linearised.upper, wanted)
+    about = linearized(plan.position, plan.rate, plan.acceleration)
+    bounds = problem.bounds(linearized.lower, linearized.upper, wanted)
     cost = problem.cost(plan, about, wanted, sensed)
     return Program(problem, cost, about, bounds, plan, wanted, active)
 
@@ -112,7 +112,7 @@ def with_states(program: Program) -> Matrices:
     grid, about = program.problem.grid, program.about
     n, k = len(grid.times), len(program.problem.axes)
     slopes = about.slopes
-    error = about.values[:, :N_CUES] - program.wanted / cue_scales()
+    error = about.values[:, :N_CUES] - program.reference_cue / cue_scales()
     w = grid.weights
     blocks = [w[j] * slopes[j, :N_CUES].T @ slopes[j, :N_CUES] for j in range(n)]
     gradient = np.concatenate([w[j] * slopes[j, :N_CUES].T @ error[j] for j in range(n)])

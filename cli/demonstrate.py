@@ -37,7 +37,7 @@ class DemonstrateCommand:
     policy: Annotated[str, arg(metavar="NAME|FILE")] = "optimum"
     """Controller, by name or file."""
     objective: Literal["J", "perceived"] = "J"
-    """What the optimum minimises: J, or J of what the driver senses."""
+    """What the optimum minimizes: J, or J of what the driver senses."""
     maneuver: Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")] = ()
     """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them; default: none."""
     random: int = 0

@@ -142,7 +142,7 @@ def _progress(seconds: float) -> Iterator[Tell]:
 
 def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceResults:
     from ..envs.simulator.simulator import TIME_STEP
-    from ..evaluation.endurance.results import EnduranceResults, summarised
+    from ..evaluation.endurance.results import EnduranceResults, summarized
 
     driven = {name: one for name, one in found.policies.items() if one.drives}
     return EnduranceResults(
@@ -150,7 +150,7 @@ def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceRes
         platform=asked.platform.name,
         endurance=asked.endurance,
         finished=found.finished,
-        summaries={name: summarised(one.drives, TIME_STEP) for name, one in driven.items()},
+        summaries={name: summarized(one.drives, TIME_STEP) for name, one in driven.items()},
         policies=driven,
     )
 

@@ -15,7 +15,7 @@ from ..evaluation.policies import find_agent
 
 @dataclass(frozen=True)
 class ExportCommand:
-    """Write an agent's network with its normalisation as ONNX, check it, and time it.
+    """Write an agent's network with its normalization as ONNX, check it, and time it.
 
     `motion-cueing list` shows the names of the agents that come with the package.
     """

@@ -50,7 +50,7 @@ class RobustnessCommand:
     """Standard deviation of the noise on specific forces, m/s^2."""
     rate_noise: float = 0.3
     """Standard deviation of the noise on angular velocities, deg/s."""
-    fierceness: float = 2.0
+    time_scaling: float = 2.0
     """Factor on all accelerations of the drives."""
     out: Annotated[Path, arg(metavar="DIR")] = Path("robustness")
     """Folder for everything that is written; made if missing."""
@@ -106,6 +106,6 @@ def make_study(command: RobustnessCommand) -> Study:
             lag=command.lag,
             dead_time=command.dead_time,
             noise=SensorNoise(force=command.force_noise, rate=math.radians(command.rate_noise)),
-            fierceness=command.fierceness,
+            time_scaling=command.time_scaling,
         ),
     )

@@ -15,7 +15,7 @@ from ..evaluation.studies.results import (
     matrix_table,
     print_study,
     share_tables,
-    summarise,
+    summarize,
 )
 from ..evaluation.studies.store import check_kept, forget_kept
 from ..evaluation.studies.study import Condition, StudyOutcome, run_study
@@ -94,7 +94,7 @@ def results_of(
         conditions={condition.name: condition.description for condition in conditions},
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),
-        summaries=summarise(outcome.metrics, criteria),
+        summaries=summarize(outcome.metrics, criteria),
         left_out=outcome.left_out,
         failures=tuple(outcome.failures),
         metrics=outcome.metrics,

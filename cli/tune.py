@@ -100,7 +100,7 @@ class TuneCommand:
     algorithm: Positional[Annotated[str, arg(metavar="|".join(ALGORITHMS))]]
     """What to tune."""
     objective: Literal["J", "perceived"] = "J"
-    """What to minimise: J, or J of what the driver senses."""
+    """What to minimize: J, or J of what the driver senses."""
     method: Literal["cma", "gradient"] = "cma"
     """Search with CMA-ES, or, classical only, along the gradient of J through the machine's equations."""
     maneuvers: Annotated[tuple[str, ...], arg(metavar="train|NAME|FILE ...")] = ("train",)

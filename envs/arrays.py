@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .errors import ConfigurationError
 
 
-def _initialise_quietly() -> None:
+def _initialize_quietly() -> None:
     """Start Warp without its greeting and its native warning on a machine that has no GPU."""
     wp.config.log_level = wp.LOG_ERROR
     sys.stderr.flush()
@@ -32,7 +32,7 @@ def _initialise_quietly() -> None:
     wp.config.log_level = wp.LOG_WARNING
 
 
-_initialise_quietly()
+_initialize_quietly()
 
 _NAME: Final = os.environ.get("MOTION_CUEING_PRECISION", "double")
 if _NAME not in ("single", "double"):

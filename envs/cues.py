@@ -116,7 +116,7 @@ class CueTrace:
         return found.hexdigest()
 
     def at_point(self, offset: ArrayLike) -> Floats:
-        """Specific force (n, 3) at a point fixed to the car, ``offset`` (3,) in metres from F_A's origin.
+        """Specific force (n, 3) at a point fixed to the car, ``offset`` (3,) in meters from F_A's origin.
 
         f_P = f_A + (Omegadot + Omega Omega) OP, the rigid-body part of Eq. (37).
         """

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 
 import yaml
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AliasChoices, ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 from typing_extensions import dataclass_transform
 
@@ -27,6 +27,16 @@ Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
 T = TypeVar("T")
+
+
+def renamed(name: str, *before: str) -> Any:
+    """Metadata of a field that had other names in files of earlier versions; those are still read.
+
+    Args:
+        name: Its name.
+        before: Its earlier names.
+    """
+    return Field(validation_alias=AliasChoices(name, *before))
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))

@@ -107,8 +107,8 @@ def demonstrate(demonstrator: Demonstrator, name: str, cues: CueTrace) -> tuple[
         time=record.time[before],
         observation=np.array(watched.seen),
         action=record.action[1:],
-        force=record.f_wanted[before],
-        rate=record.w_wanted[before],
+        force=record.f_reference[before],
+        rate=record.w_reference[before],
         position=np.column_stack(axes)[before],
         velocity=np.column_stack(rates)[before],
     )

@@ -99,7 +99,7 @@ class AxisMetrics:
         cue_error_false: The part of ``cue_error`` that arises during false cues.
         cue_error_missing: The part of ``cue_error`` that arises during missing cues.
         perceived_rmse: RMSE of the sensed signals.
-        perceived_nrmse: Normalised RMSE of the sensed signals.
+        perceived_nrmse: Normalized RMSE of the sensed signals.
         perceived_cue_error: This axis's part of the perceived J.
     """
 
@@ -188,12 +188,12 @@ class Metrics:
 def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics:
     """All metrics of a trajectory."""
     criteria = criteria or Criteria()
-    wanted, felt = cab_motion(trajectory)
+    reference, simulated = cab_motion(trajectory)
     axes = _axes(trajectory, criteria)
     false, missing = np.zeros(len(trajectory), bool), np.zeros(len(trajectory), bool)
     for i, threshold in enumerate(criteria.thresholds):
-        false |= signals.false_cues(wanted[:, i], felt[:, i], threshold)
-        missing |= signals.missing_cues(wanted[:, i], felt[:, i], threshold)
+        false |= signals.false_cues(reference[:, i], simulated[:, i], threshold)
+        missing |= signals.missing_cues(reference[:, i], simulated[:, i], threshold)
     rate = tilt_rate(trajectory)
     mean, p99, longest = _step_time(trajectory.step_time)
     flags = trajectory.limits_active
@@ -217,35 +217,39 @@ def measure(trajectory: Trajectory, criteria: Criteria | None = None) -> Metrics
         step_time_p99=p99,
         step_time_max=longest,
         vibration=signals.vibration(
-            wanted[:, :3], felt[:, :3], trajectory.dt, criteria.vibration_above, criteria.vibration_window
+            reference[:, :3],
+            simulated[:, :3],
+            trajectory.dt,
+            criteria.vibration_above,
+            criteria.vibration_window,
         ),
     )
 
 
 def cab_motion(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """Wanted and felt motion at the cab point, (n, 6) by :data:`CUE_AXES`, zero at rest on level ground."""
-    wanted = np.column_stack([trajectory.f_wanted, trajectory.w_wanted]) - _REST
-    felt = np.column_stack([trajectory.f_felt, trajectory.w_felt]) - _REST
-    return wanted, felt
+    reference = np.column_stack([trajectory.f_reference, trajectory.w_reference]) - _REST
+    simulated = np.column_stack([trajectory.f_simulator, trajectory.w_simulator]) - _REST
+    return reference, simulated
 
 
 def sensed_motion(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """Sensed motion in car and simulator, (n, 6) by :data:`CUE_AXES`, zero at rest on level ground."""
-    wanted = np.column_stack([trajectory.sensed_f_wanted, trajectory.sensed_w_wanted]) - _REST
-    felt = np.column_stack([trajectory.sensed_f_felt, trajectory.sensed_w_felt]) - _REST
-    return wanted, felt
+    reference = np.column_stack([trajectory.perceived_f_reference, trajectory.perceived_w_reference]) - _REST
+    simulated = np.column_stack([trajectory.perceived_f_simulator, trajectory.perceived_w_simulator]) - _REST
+    return reference, simulated
 
 
-def cue_error(wanted: Floats, felt: Floats, criteria: Criteria | None = None) -> Floats:
+def cue_error(reference: Floats, simulated: Floats, criteria: Criteria | None = None) -> Floats:
     """(n,) |df|^2 / (0.6 m/s^2)^2 + |dw|^2 / (3 deg/s)^2, whose mean over time is J.
 
     Args:
-        wanted: (n, 6) by :data:`CUE_AXES`.
-        felt: (n, 6) the same of the simulator.
+        reference: (n, 6) by :data:`CUE_AXES`.
+        simulated: (n, 6) the same of the simulator.
         criteria: The indifference zone.
     """
     scales = np.array((criteria or Criteria()).scales)
-    return np.asarray(np.sum(((felt - wanted) / scales) ** 2, axis=1))
+    return np.asarray(np.sum(((simulated - reference) / scales) ** 2, axis=1))
 
 
 def tilt_rate(trajectory: Trajectory) -> Floats:
@@ -254,7 +258,7 @@ def tilt_rate(trajectory: Trajectory) -> Floats:
     Measured at the cab, where the driver sits, so that it holds for any policy. A cab that rolls with its
     car, or less, has none; a machine that stands still has none.
     """
-    extra = signals.beyond(trajectory.w_wanted[:, :2], trajectory.w_felt[:, :2])
+    extra = signals.beyond(trajectory.w_reference[:, :2], trajectory.w_simulator[:, :2])
     return np.asarray(np.hypot(extra[:, 0], extra[:, 1]))
 
 
@@ -265,27 +269,27 @@ def _axes(trajectory: Trajectory, criteria: Criteria) -> dict[str, AxisMetrics]:
 
 def _axis(motions: Floats, dt: float, criteria: Criteria, i: int) -> AxisMetrics:
     """Metrics of axis ``i`` from its (4, n) motions: wanted, felt, sensed wanted, sensed felt."""
-    wanted, felt, sensed, sensed_felt = motions
+    reference, simulated, sensed, perceived_simulator = motions
     threshold, scale = criteria.thresholds[i], criteria.scales[i]
-    error = ((felt - wanted) / scale) ** 2
-    false = signals.false_cues(wanted, felt, threshold)
-    missing = signals.missing_cues(wanted, felt, threshold)
+    error = ((simulated - reference) / scale) ** 2
+    false = signals.false_cues(reference, simulated, threshold)
+    missing = signals.missing_cues(reference, simulated, threshold)
     # Below the threshold there is nothing whose delay a driver could feel.
-    moves = min(np.abs(wanted).max(), np.abs(felt).max()) > threshold
+    moves = min(np.abs(reference).max(), np.abs(simulated).max()) > threshold
     reach, least = criteria.delay_range, criteria.delay_correlation
     return AxisMetrics(
-        rmse=signals.rms(felt - wanted),
-        nrmse=signals.normalised_rmse(wanted, felt, threshold),
-        correlation=signals.pearson(wanted, felt),
-        delay=signals.delay(wanted, felt, dt, reach, least) if moves else None,
+        rmse=signals.rms(simulated - reference),
+        nrmse=signals.normalized_rmse(reference, simulated, threshold),
+        correlation=signals.pearson(reference, simulated),
+        delay=signals.delay(reference, simulated, dt, reach, least) if moves else None,
         false_cues=float(false.mean()),
         missing_cues=float(missing.mean()),
         cue_error=float(error.mean()),
         cue_error_false=float(np.mean(error * false)),
         cue_error_missing=float(np.mean(error * missing)),
-        perceived_rmse=signals.rms(sensed_felt - sensed),
-        perceived_nrmse=signals.normalised_rmse(sensed, sensed_felt, threshold),
-        perceived_cue_error=float(np.mean(((sensed_felt - sensed) / scale) ** 2)),
+        perceived_rmse=signals.rms(perceived_simulator - sensed),
+        perceived_nrmse=signals.normalized_rmse(sensed, perceived_simulator, threshold),
+        perceived_cue_error=float(np.mean(((perceived_simulator - sensed) / scale) ** 2)),
     )
 
 

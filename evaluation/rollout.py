@@ -22,7 +22,7 @@ from ..envs.platform import Platform, actuator_limits, get_platform
 from ..envs.settings import to_dict
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE, observe_forward
 from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
-from ..envs.task import EpisodeOptions, RandomisationOptions, TaskOptions
+from ..envs.task import EpisodeOptions, RandomizationOptions, TaskOptions
 from ..envs.task.batch import Batch
 from ..envs.task.drives import platform_of
 from .trajectory import LimitTable, Trajectory
@@ -267,7 +267,7 @@ def deterministic(task: TaskOptions, vestibular: VestibularModel) -> TaskOptions
             f"{vestibular.name!r}; pass vestibular=get_vestibular_model({task.vestibular!r})"
         )
     return replace(
-        task, vestibular=vestibular.name, episode=EpisodeOptions(), randomisation=RandomisationOptions()
+        task, vestibular=vestibular.name, episode=EpisodeOptions(), randomization=RandomizationOptions()
     )
 
 
@@ -350,7 +350,7 @@ def trajectory_of(
         car: That was driven, for the record.
     """
     states, platform = recording.states, driver.simulator.platforms[0]
-    motion, felt, wanted = states["motion"], states["felt"], states["wanted"]
+    motion, simulated, reference = states["motion"], states["simulator_cue"], states["reference_cue"]
     shifts = np.arange(0, 36, 4, dtype=np.uint64)
     limits = actuator_limits(platform)
     parameters = getattr(policy, "parameters", None)
@@ -360,16 +360,16 @@ def trajectory_of(
         platform=platform.name,
         car=car.name if car else cues.source or cues.name,
         time=cues.time,
-        f_wanted=wanted["force"],
-        w_wanted=wanted["rate"],
-        head_f_wanted=wanted["head_force"],
-        f_felt=felt["force"],
-        w_felt=felt["rate"],
-        head_f_felt=felt["head_force"],
-        sensed_f_wanted=states["sensed_wanted"]["force"],
-        sensed_w_wanted=states["sensed_wanted"]["rate"],
-        sensed_f_felt=states["sensed_felt"]["force"],
-        sensed_w_felt=states["sensed_felt"]["rate"],
+        f_reference=reference["force"],
+        w_reference=reference["rate"],
+        head_f_reference=reference["head_force"],
+        f_simulator=simulated["force"],
+        w_simulator=simulated["rate"],
+        head_f_simulator=simulated["head_force"],
+        perceived_f_reference=states["perceived_reference"]["force"],
+        perceived_w_reference=states["perceived_reference"]["rate"],
+        perceived_f_simulator=states["perceived_simulator"]["force"],
+        perceived_w_simulator=states["perceived_simulator"]["rate"],
         carriage=motion["position"][:, :2],
         carriage_rate=motion["rate"][:, :2],
         hexapod=np.hstack([motion["displacement"], motion["beta"]]),

@@ -47,7 +47,7 @@ def find_car(name: str) -> Car:
 def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
     """Label and name (or file) of each policy; those meant for a machine where none is named.
 
-    `ladder` stands for its policies. A file is never labelled as a shipped policy: shares refer to those.
+    `ladder` stands for its policies. A file is never labeled as a shipped policy: shares refer to those.
     """
     from .policies import default_policies, policy_names
 

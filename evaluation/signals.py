@@ -20,30 +20,30 @@ def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def normalised_rmse(wanted: Floats, felt: Floats, floor: float) -> float:
+def normalized_rmse(reference: Floats, simulated: Floats, floor: float) -> float:
     """RMSE over the larger of the RMS of ``wanted`` and ``floor``; both signals are zero at rest.
 
     No motion has 1 where the car moves; the floor keeps an axis finite in which it does not.
     """
-    return rms(felt - wanted) / max(rms(wanted), floor)
+    return rms(simulated - reference) / max(rms(reference), floor)
 
 
-def pearson(wanted: Floats, felt: Floats) -> float | None:
+def pearson(reference: Floats, simulated: Floats) -> float | None:
     """Pearson's correlation of two (n,) signals; None where one of them is constant."""
-    a, b = wanted - wanted.mean(), felt - felt.mean()
+    a, b = reference - reference.mean(), simulated - simulated.mean()
     spread = rms(a), rms(b)
     if min(spread) < FLAT:
         return None
     return float(np.clip(np.mean(a * b) / (spread[0] * spread[1]), -1.0, 1.0))
 
 
-def correlation_by_lag(wanted: Floats, felt: Floats, reach: int) -> Floats:
+def correlation_by_lag(reference: Floats, simulated: Floats, reach: int) -> Floats:
     """(2 reach + 1,) Pearson correlations of ``wanted[k]`` and ``felt[k + lag]`` over their overlap.
 
     Lags run from -reach to reach; NaN where a signal is constant on the overlap.
     """
-    n = len(wanted)
-    a, b = wanted - wanted.mean(), felt - felt.mean()
+    n = len(reference)
+    a, b = reference - reference.mean(), simulated - simulated.mean()
     lags = np.arange(-reach, reach + 1)
     products = correlate(b, a, mode="full", method="fft")[n - 1 + lags]
     # The overlap in `wanted` is [start, start + count), in `felt` [start + lag, start + lag + count).
@@ -64,14 +64,14 @@ def _window(values: Floats, start: NDArray[np.int_], count: NDArray[np.int_]) ->
     return (sums[start + count] - sums[start]) / count, (squares[start + count] - squares[start]) / count
 
 
-def delay(wanted: Floats, felt: Floats, dt: float, reach: float, least: float) -> float | None:
+def delay(reference: Floats, simulated: Floats, dt: float, reach: float, least: float) -> float | None:
     """How much later ``felt`` does what ``wanted`` does, s; negative where it leads.
 
-    The lag of the highest correlation, refined by a parabola through the peak and its two neighbours.
+    The lag of the highest correlation, refined by a parabola through the peak and its two neighbors.
 
     Args:
-        wanted: (n,) signal of the car.
-        felt: (n,) signal of the simulator.
+        reference: (n,) signal of the car.
+        simulated: (n,) signal of the simulator.
         dt: Time step, s.
         reach: Largest lag searched either way, s.
         least: Correlation that the peak must have.
@@ -80,10 +80,10 @@ def delay(wanted: Floats, felt: Floats, dt: float, reach: float, least: float) -
         None where no peak lies inside the search or it is lower than ``least``: no delay to speak of.
     """
     # At least three quarters of the drive overlap at every lag.
-    samples = min(round(reach / dt), len(wanted) // 4)
+    samples = min(round(reach / dt), len(reference) // 4)
     if samples < 1:
         return None
-    values = correlation_by_lag(wanted, felt, samples)
+    values = correlation_by_lag(reference, simulated, samples)
     if np.isnan(values).any():
         return None
     peak = int(np.argmax(values))
@@ -95,27 +95,27 @@ def delay(wanted: Floats, felt: Floats, dt: float, reach: float, least: float) -
     return float((peak - samples + shift) * dt)
 
 
-def false_cues(wanted: Floats, felt: Floats, threshold: float) -> Mask:
+def false_cues(reference: Floats, simulated: Floats, threshold: float) -> Mask:
     """(n,) where the simulator noticeably moves against the car, or while the car does not noticeably move.
 
     The difference itself must be noticeable: 0.18 for 0.16 at a threshold of 0.17 is no false cue.
     """
-    against = (np.abs(wanted) <= threshold) | (wanted * felt < 0.0)
-    return np.asarray((np.abs(felt) > threshold) & against & (np.abs(felt - wanted) > threshold))
+    against = (np.abs(reference) <= threshold) | (reference * simulated < 0.0)
+    return np.asarray((np.abs(simulated) > threshold) & against & (np.abs(simulated - reference) > threshold))
 
 
-def missing_cues(wanted: Floats, felt: Floats, threshold: float) -> Mask:
+def missing_cues(reference: Floats, simulated: Floats, threshold: float) -> Mask:
     """(n,) where the car noticeably moves, the simulator does not, and the difference is noticeable."""
-    silent = np.abs(felt) <= threshold
-    return np.asarray((np.abs(wanted) > threshold) & silent & (np.abs(felt - wanted) > threshold))
+    silent = np.abs(simulated) <= threshold
+    return np.asarray((np.abs(reference) > threshold) & silent & (np.abs(simulated - reference) > threshold))
 
 
-def beyond(wanted: Floats, felt: Floats) -> Floats:
+def beyond(reference: Floats, simulated: Floats) -> Floats:
     """The part of ``felt`` outside the interval between zero and ``wanted``: motion nobody asked for."""
-    return np.asarray(felt - np.clip(felt, np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)))
+    return np.asarray(simulated - np.clip(simulated, np.minimum(reference, 0.0), np.maximum(reference, 0.0)))
 
 
-def vibration(wanted: Floats, felt: Floats, dt: float, above: float, window: float) -> float | None:
+def vibration(reference: Floats, simulated: Floats, dt: float, above: float, window: float) -> float | None:
     """How much ``felt`` shakes more than ``wanted`` in its worst window.
 
     The root of the largest difference of their mean squares over a window, after a high-pass (Butterworth of
@@ -123,8 +123,8 @@ def vibration(wanted: Floats, felt: Floats, dt: float, above: float, window: flo
     the simulator follows it.
 
     Args:
-        wanted: (n, k) signals of the car.
-        felt: (n, k) signals of the simulator.
+        reference: (n, k) signals of the car.
+        simulated: (n, k) signals of the simulator.
         dt: Time step, s.
         above: Corner frequency, Hz.
         window: Length of the window, s.
@@ -133,11 +133,11 @@ def vibration(wanted: Floats, felt: Floats, dt: float, above: float, window: flo
         None where the signals are shorter than a window, or sampled too seldom to hold the frequency.
     """
     count = round(window / dt)
-    if not 1 < count < len(wanted) or above * dt >= 0.5:
+    if not 1 < count < len(reference) or above * dt >= 0.5:
         return None
     filters = butter(4, above, "highpass", fs=1.0 / dt, output="sos")
     of_car, of_cab = (
-        np.sum(sosfiltfilt(filters, x, axis=0, padlen=count) ** 2, axis=1) for x in (wanted, felt)
+        np.sum(sosfiltfilt(filters, x, axis=0, padlen=count) ** 2, axis=1) for x in (reference, simulated)
     )
     sums = np.concatenate([[0.0], np.cumsum(of_cab - of_car)])
     return float(np.sqrt(max(0.0, np.max(sums[count:] - sums[:-count]) / count)))

@@ -277,4 +277,6 @@ def cue_sources(drives: Mapping[str, Trajectory]) -> dict[str, CueSource]:
 
 def cues_of(drive: Trajectory, name: str) -> CueTrace:
     """The cues that were wanted in a drive."""
-    return CueTrace(name, drive.time, drive.f_wanted, drive.w_wanted, source=f"as driven by {drive.policy}")
+    return CueTrace(
+        name, drive.time, drive.f_reference, drive.w_reference, source=f"as driven by {drive.policy}"
+    )

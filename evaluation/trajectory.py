@@ -33,16 +33,16 @@ AT_ACCELERATION: Final = 4
 
 _COLUMNS: Final[Mapping[str, tuple[int, ...]]] = {
     "time": (),
-    "f_wanted": (3,),
-    "w_wanted": (3,),
-    "head_f_wanted": (3,),
-    "f_felt": (3,),
-    "w_felt": (3,),
-    "head_f_felt": (3,),
-    "sensed_f_wanted": (3,),
-    "sensed_w_wanted": (3,),
-    "sensed_f_felt": (3,),
-    "sensed_w_felt": (3,),
+    "f_reference": (3,),
+    "w_reference": (3,),
+    "head_f_reference": (3,),
+    "f_simulator": (3,),
+    "w_simulator": (3,),
+    "head_f_simulator": (3,),
+    "perceived_f_reference": (3,),
+    "perceived_w_reference": (3,),
+    "perceived_f_simulator": (3,),
+    "perceived_w_simulator": (3,),
     "carriage": (2,),
     "carriage_rate": (2,),
     "hexapod": (6,),
@@ -89,8 +89,8 @@ class LimitTable:
 class Trajectory:
     """One drive of one policy. Row k is the machine at ``time[k]``; row 0 is the start, before any action.
 
-    Arrays are copied, checked and made read-only. "Wanted" is what the driver feels in the car, "felt" what
-    the driver feels in the simulator, at the cab's reference point (F_A and F_S) unless the head is named.
+    Arrays are copied, checked and made read-only. Reference cues are those of the car, simulator cues those of
+    the cab, at its reference point (F_A and F_S) unless the head is named.
     x forward, y right, z down.
 
     Args:
@@ -99,16 +99,16 @@ class Trajectory:
         platform: Name of the motion base.
         car: Name of the car.
         time: (n,) s, strictly increasing.
-        f_wanted: (n, 3) specific force at the cab point of the car, m/s^2.
-        w_wanted: (n, 3) angular velocity of the car, rad/s.
-        head_f_wanted: (n, 3) specific force at the driver's head in the car, m/s^2.
-        f_felt: (n, 3) specific force at the cab point of the simulator, in F_S, m/s^2.
-        w_felt: (n, 3) angular velocity of the cab, in F_S, rad/s.
-        head_f_felt: (n, 3) specific force at the head in the simulator, m/s^2.
-        sensed_f_wanted: (n, 3) otolith output for the car over the static gain 0.4, m/s^2.
-        sensed_w_wanted: (n, 3) canal output for the car, rad/s.
-        sensed_f_felt: (n, 3) the same for the simulator.
-        sensed_w_felt: (n, 3) the same for the simulator.
+        f_reference: (n, 3) specific force at the cab point of the car, m/s^2.
+        w_reference: (n, 3) angular velocity of the car, rad/s.
+        head_f_reference: (n, 3) specific force at the driver's head in the car, m/s^2.
+        f_simulator: (n, 3) specific force at the cab point of the simulator, in F_S, m/s^2.
+        w_simulator: (n, 3) angular velocity of the cab, in F_S, rad/s.
+        head_f_simulator: (n, 3) specific force at the head in the simulator, m/s^2.
+        perceived_f_reference: (n, 3) otolith output for the car over the static gain 0.4, m/s^2.
+        perceived_w_reference: (n, 3) canal output for the car, rad/s.
+        perceived_f_simulator: (n, 3) the same for the simulator.
+        perceived_w_simulator: (n, 3) the same for the simulator.
         carriage: (n, 2) position x, y of the carriage, m.
         carriage_rate: (n, 2) m/s.
         hexapod: (n, 6) x, y, z, roll, pitch, yaw from neutral, m and rad.
@@ -135,16 +135,16 @@ class Trajectory:
     platform: str
     car: str
     time: Floats
-    f_wanted: Floats
-    w_wanted: Floats
-    head_f_wanted: Floats
-    f_felt: Floats
-    w_felt: Floats
-    head_f_felt: Floats
-    sensed_f_wanted: Floats
-    sensed_w_wanted: Floats
-    sensed_f_felt: Floats
-    sensed_w_felt: Floats
+    f_reference: Floats
+    w_reference: Floats
+    head_f_reference: Floats
+    f_simulator: Floats
+    w_simulator: Floats
+    head_f_simulator: Floats
+    perceived_f_reference: Floats
+    perceived_w_reference: Floats
+    perceived_f_simulator: Floats
+    perceived_w_simulator: Floats
     carriage: Floats
     carriage_rate: Floats
     hexapod: Floats

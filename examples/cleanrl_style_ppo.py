@@ -50,7 +50,7 @@ class Args:
     gamma: float = 0.97
     """Discount."""
     gae_lambda: float = 0.95
-    """Of the generalised advantage estimation."""
+    """Of the generalized advantage estimation."""
     clip: float = 0.2
     """Largest change of a probability ratio that pays."""
     reward_scale: float = 0.02
@@ -122,7 +122,7 @@ def play(
 
 
 def advantages(played: Rollout, value_after: torch.Tensor, args: Args) -> torch.Tensor:
-    """(steps, environments) by generalised advantage estimation; nothing flows back over an episode's end."""
+    """(steps, environments) by generalized advantage estimation; nothing flows back over an episode's end."""
     found, carried, following = torch.zeros_like(played.reward), torch.zeros_like(value_after), value_after
     for k in reversed(range(len(found))):
         goes_on = 1.0 - played.ended[k].float()

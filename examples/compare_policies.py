@@ -32,7 +32,7 @@ class CarriageOnSprings:
         """Accelerations (n, 9): carriage x, y; hexapod x, y, z, roll, pitch, yaw; turntable."""
         action = np.zeros((len(observation), 9))
         action[:, :2] = (
-            read(observation, "wanted_force")[:, :2]
+            read(observation, "reference_force")[:, :2]
             - 0.04 * read(observation, "carriage")
             - 0.28 * read(observation, "carriage_rate")
         )

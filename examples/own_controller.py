@@ -45,7 +45,7 @@ class TiltAndShove:
         deterministic: bool = True,
     ) -> tuple[NDArray[Any], Any]:
         """Accelerations (n, 9), and the low-passed forces (n, 2) as the state."""
-        force = read(observation, "wanted_force")[:, :2]
+        force = read(observation, "reference_force")[:, :2]
         slow = np.zeros_like(force) if state is None else state
         slow = slow + TIME_STEP * self.crossover * (force - slow)
 

@@ -219,7 +219,7 @@ class Controller:
         begin = self._machine.motion
         self._catch_up()
         action, seconds = self._moved(begins=self._began == len(self.log))
-        self.log.add(self._machine.wanted, action, seconds, self.state)
+        self.log.add(self._machine.reference_cue, action, seconds, self.state)
         self._rows = self._track.between(begin, self._machine.motion)
         self._decided = True
 

@@ -29,7 +29,7 @@ AT_REST: Final = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
 """Cues of a car that stands: specific force and angular velocity; read-only."""
 AT_REST.setflags(write=False)
 
-_SCALE: Final = np.repeat([SCALES["wanted_force"], SCALES["wanted_rate"]], 3)
+_SCALE: Final = np.repeat([SCALES["reference_force"], SCALES["reference_rate"]], 3)
 
 NOW: Final = 1
 """Row of the cues that are wanted now; the kernels step to it from the row before."""
@@ -67,7 +67,7 @@ class LiveCues:
         self._past: Floats = np.tile(self._scaled(), (len(time_constants), 1))
 
     @property
-    def wanted(self) -> Floats:
+    def reference_cue(self) -> Floats:
         """(6,) cues wanted now."""
         return np.concatenate([self._rows[0][NOW], self._rows[1][NOW]])
 
@@ -90,7 +90,7 @@ class LiveCues:
 
     def _scaled(self) -> Floats:
         """(6,) cues wanted now, as an observation scales them."""
-        return np.asarray((self.wanted - AT_REST) / _SCALE)
+        return np.asarray((self.reference_cue - AT_REST) / _SCALE)
 
     def _remember(self) -> None:
         if self._memory is not None:
@@ -255,9 +255,9 @@ class LiveMachine(ABC):
         self.motion = self._view()
 
     @property
-    def wanted(self) -> Floats:
+    def reference_cue(self) -> Floats:
         """(6,) cues wanted now: specific force, m/s^2, and angular velocity, rad/s."""
-        return self._cues.wanted
+        return self._cues.reference_cue
 
     def catch_up(self, cues: Floats) -> None:
         """Take the machine to where it was a step ahead, with the cues (6,) that are wanted there.

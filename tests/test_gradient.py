@@ -79,8 +79,8 @@ def test_the_cost_is_that_of_the_simulator():
     expected = unrolled.value(actions)
     for action in actions:
         state = simulator.step(action)
-        df = state["felt"]["force"] - state["wanted"]["force"]
-        dw = state["felt"]["rate"] - state["wanted"]["rate"]
+        df = state["simulator_cue"]["force"] - state["reference_cue"]["force"]
+        dw = state["simulator_cue"]["rate"] - state["reference_cue"]["rate"]
         total += (df**2).sum(axis=1) / 0.6**2 + (dw**2).sum(axis=1) / np.radians(3.0) ** 2
     np.testing.assert_allclose(total / STEPS, expected, rtol=1e-12)
 

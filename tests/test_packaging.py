@@ -82,11 +82,11 @@ def test_data_files_are_in_the_wheel(wheel, name):
     assert zipfile.ZipFile(wheel).getinfo(f"motion_cueing/{name}").file_size >= (0 if "typed" in name else 1)
 
 
-def test_licences_are_in_the_wheel(wheel):
+def test_licenses_are_in_the_wheel(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    licences = {name.split(".dist-info/licenses/")[1] for name in names if ".dist-info/licenses/" in name}
+    licenses = {name.split(".dist-info/licenses/")[1] for name in names if ".dist-info/licenses/" in name}
     notices = {path.as_posix() for path in package_files() if path.name.startswith("NOTICE")}
-    assert licences == {"LICENSE"} | notices
+    assert licenses == {"LICENSE"} | notices
 
 
 def test_the_command_works_where_only_the_wheel_is(installed, tmp_path):

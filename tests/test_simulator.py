@@ -61,7 +61,7 @@ def test_every_platform_has_its_own_head():
     other = replace(PLATFORMS[0], cab=Cab(head=(0.4, 0.3, -1.0)))
     batch = Simulator([PLATFORMS[0], other], DRIVES[1], platform_of=[0, 1], drive_of=[0, 0])
     batch.reset()
-    wanted = batch.step(np.zeros((2, 9)))["wanted"]["head_force"]
+    wanted = batch.step(np.zeros((2, 9)))["reference_cue"]["head_force"]
     for i, platform in enumerate(batch.platforms):
         np.testing.assert_allclose(wanted[i], DRIVES[1].at_point(platform.cab.head)[1], atol=1e-12)
 
@@ -105,11 +105,13 @@ def test_the_first_state_is_at_rest_where_it_was_put():
     assert not motion["rate"].any()
     assert not state["acceleration"].any()
     assert state["limits"] == 0
-    assert np.linalg.norm(state["felt"]["force"]) == pytest.approx(9.81, rel=1e-13)
-    np.testing.assert_allclose(state["sensed_felt"]["force"], state["felt"]["head_force"], atol=1e-10)
-    np.testing.assert_array_equal(state["wanted"]["force"], DRIVES[1].specific_force[5])
+    assert np.linalg.norm(state["simulator_cue"]["force"]) == pytest.approx(9.81, rel=1e-13)
     np.testing.assert_allclose(
-        state["wanted"]["head_force"], DRIVES[1].at_point(PLATFORMS[0].cab.head)[5], atol=1e-12
+        state["perceived_simulator"]["force"], state["simulator_cue"]["head_force"], atol=1e-10
+    )
+    np.testing.assert_array_equal(state["reference_cue"]["force"], DRIVES[1].specific_force[5])
+    np.testing.assert_allclose(
+        state["reference_cue"]["head_force"], DRIVES[1].at_point(PLATFORMS[0].cab.head)[5], atol=1e-12
     )
 
 
@@ -120,8 +122,8 @@ def test_wanted_cues_walk_through_the_drive_and_stay_at_its_end():
         state = batch.step(np.zeros(9))[0]
         sample = min(k, len(DRIVES[0]) - 1)
         assert state["sample"] == k
-        np.testing.assert_array_equal(state["wanted"]["force"], DRIVES[0].specific_force[sample])
-        np.testing.assert_array_equal(state["wanted"]["rate"], DRIVES[0].angular_velocity[sample])
+        np.testing.assert_array_equal(state["reference_cue"]["force"], DRIVES[0].specific_force[sample])
+        np.testing.assert_array_equal(state["reference_cue"]["rate"], DRIVES[0].angular_velocity[sample])
         assert batch.finished[0] == (k >= len(DRIVES[0]) - 1)
 
 

@@ -13,7 +13,7 @@ from ..baselines.washout import WashoutParameters, load_washout
 from ..envs.errors import ConfigurationError
 from ..envs.maneuvers import drive_seeds
 from ..envs.settings import Positive, configuration, from_dict, read_yaml
-from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomisationOptions, TaskOptions
+from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomizationOptions, TaskOptions
 from .registry import algorithm_names, get_algorithm, preset_file
 
 Measure = Literal["cue_error", "perceived_error", "reward"]
@@ -29,7 +29,7 @@ _RECIPES: Final = Path(__file__).parent / "recipes"
 
 @configuration
 class NormalizeOptions:
-    """Running normalisation, as Stable-Baselines3's ``VecNormalize`` does it.
+    """Running normalization, as Stable-Baselines3's ``VecNormalize`` does it.
 
     Args:
         observation: Whether observations are; the agent's file holds their mean and variance.
@@ -44,7 +44,7 @@ class NormalizeOptions:
 
 @configuration
 class ValidationOptions:
-    """Random drives that are never trained on, driven whole from neutral without randomisation.
+    """Random drives that are never trained on, driven whole from neutral without randomization.
 
     Args:
         every: Actions between validations, over all environments.
@@ -136,7 +136,7 @@ class TrainingConfig:
             YAML file; "classical" if none is named.
         initial: Agent file whose network the training begins with; it sees and does the same.
         hyperparameters: Arguments of the algorithm.
-        normalize: Running normalisation.
+        normalize: Running normalization.
         n_envs: Environments stepped together.
         steps: Actions in all, over all environments.
         seed: Of everything that is drawn.
@@ -182,15 +182,15 @@ class TrainingConfig:
 
 def validation_task(config: TrainingConfig) -> TaskOptions:
     """The environment of the validation drives, on machines of their own where builds are drawn."""
-    given, build = config.validation, config.task.randomisation.build
+    given, build = config.validation, config.task.randomization.build
     episode = EpisodeOptions(
         random=config.task.episode.random,
         library=given.drives,
         library_seed=given.seed,
         drive_duration=given.duration,
     )
-    machines = RandomisationOptions(build=build, machines=given.drives)
-    return replace(config.task, episode=episode, randomisation=machines)
+    machines = RandomizationOptions(build=build, machines=given.drives)
+    return replace(config.task, episode=episode, randomization=machines)
 
 
 def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> TrainingConfig:

@@ -59,10 +59,10 @@ class Latent(nn.Module):
 
 
 class Actor(nn.Module):
-    """Observation -> standardised -> hidden layers -> [hidden, standardised] -> linear -> reach -> tanh.
+    """Observation -> standardized -> hidden layers -> [hidden, standardized] -> linear -> reach -> tanh.
 
     Mean and deviation of the observation and the reach of each action are no weights: they give the weights a
-    scale that a learning rate can be chosen for. Until :meth:`standardise` they change nothing.
+    scale that a learning rate can be chosen for. Until :meth:`standardize` they change nothing.
 
     Args:
         size: Entries of an observation.
@@ -90,7 +90,7 @@ class Actor(nn.Module):
         return action
 
     @torch.no_grad()
-    def standardise(self, mean: torch.Tensor, deviation: torch.Tensor, reach: torch.Tensor) -> None:
+    def standardize(self, mean: torch.Tensor, deviation: torch.Tensor, reach: torch.Tensor) -> None:
         """Take a standard of observations (size,) and actions (action_size,); what is done stays the same.
 
         Only hidden layers that the last one does not listen to keep their weights: theirs is a beginning.
@@ -303,7 +303,7 @@ _LEAST_DONE: Final = 0.01
 """Smallest reach of an action."""
 
 
-def standardise(actor: Actor, batch: Batch, actions: int) -> None:
+def standardize(actor: Actor, batch: Batch, actions: int) -> None:
     """Give an actor the standard of what it sees and does as it is.
 
     Args:
@@ -345,4 +345,4 @@ def take_standard(
     mean, deviation = seen.mean(axis=0, dtype=np.float64), seen.std(axis=0, dtype=np.float64)
     reach = np.maximum(done.std(axis=0, dtype=np.float64), _LEAST_DONE)
     standard = mean, np.maximum(deviation, least), reach
-    actor.standardise(*(torch.from_numpy(x).float() for x in standard))
+    actor.standardize(*(torch.from_numpy(x).float() for x in standard))

@@ -114,7 +114,7 @@ def register(algorithm: Algorithm) -> None:
 
 
 for _algorithm in (
-    Algorithm("ppo", _SB3, "proximal policy optimisation"),
+    Algorithm("ppo", _SB3, "proximal policy optimization"),
     Algorithm("sac", _SB3, "soft actor-critic"),
     Algorithm("td3", _SB3, "twin delayed deep deterministic policy gradient"),
     Algorithm("tqc", _SB3, "truncated quantile critics", _CONTRIB),

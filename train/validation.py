@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..baselines.policy import Policy
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ..envs.task.batch import Batch
-from ..envs.task.environment import normalised
+from ..envs.task.environment import normalized
 from ..envs.task.kernels.reward import N_TERMS, TERMS
 from ..envs.task.options import ActionOptions, TaskOptions
 from .agents.base_policy import base_policy
@@ -87,7 +87,7 @@ def _plain(task: TaskOptions) -> TaskOptions:
         action=ActionOptions(),
         reward=task.reward,
         episode=task.episode,
-        randomisation=task.randomisation,
+        randomization=task.randomization,
     )
 
 
@@ -103,7 +103,7 @@ class _Accelerations:
         core = self._batch.arrays.core.pull()[:, :OBSERVATION_SIZE]
         action, self._state = self._policy.predict(core, self._state, self._begins, deterministic=True)
         self._begins[...] = False
-        return normalised(action, self._batch.scale)
+        return normalized(action, self._batch.scale)
 
 
 def _drive(batch: Batch, act: Act) -> Score:
@@ -129,7 +129,7 @@ def _drive(batch: Batch, act: Act) -> Score:
 
 def tilt_rate(state: NDArray[Any]) -> NDArray[np.float64]:
     """(n,) roll and pitch rate felt beyond the car's own, rad/s, of a simulator's state."""
-    wanted = np.asarray(state["wanted"]["rate"], dtype=np.float64)[:, :2]
-    felt = np.asarray(state["felt"]["rate"], dtype=np.float64)[:, :2]
-    beyond = felt - np.clip(felt, np.minimum(wanted, 0.0), np.maximum(wanted, 0.0))
+    reference = np.asarray(state["reference_cue"]["rate"], dtype=np.float64)[:, :2]
+    simulated = np.asarray(state["simulator_cue"]["rate"], dtype=np.float64)[:, :2]
+    beyond = simulated - np.clip(simulated, np.minimum(reference, 0.0), np.maximum(reference, 0.0))
     return np.asarray(np.hypot(*beyond.T))

@@ -20,7 +20,7 @@ from ..envs.task.batch import Batch
 from ..envs.task.environment import (
     action_space,
     frames_per_second,
-    normalised,
+    normalized,
     observation_space,
     pictures_of,
     rendered,
@@ -77,7 +77,7 @@ class DrivingSimulatorVecEnv(VecEnv):
 
     def action_of(self, acceleration: ArrayLike) -> NDArray[np.float32]:
         """Actions of the mode "acceleration" for accelerations (..., 9), m/s^2 and rad/s^2."""
-        return normalised(acceleration, self.batch.scale)
+        return normalized(acceleration, self.batch.scale)
 
     def reset(self) -> NDArray[np.float32]:
         """Begin new episodes, with the seeds and options given since the last reset."""

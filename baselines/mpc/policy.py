@@ -55,13 +55,13 @@ class Brakes:
         """
         legs = np.asarray(self._rates(position, rate))[:, 0]
         actuators = np.concatenate([rate[:2], legs, rate[8:]])
-        wanted = actuators - np.clip(actuators, -self._change, self._change)
-        action = (wanted - actuators) / TIME_STEP
+        reference = actuators - np.clip(actuators, -self._change, self._change)
+        action = (reference - actuators) / TIME_STEP
         action[2:8] = 0.0
         for _ in range(_ROUNDS):
             after, slope = (np.asarray(part) for part in self._after(position, rate, action))
             # Least squares: near a singular pose no accelerations give the legs all of their rates.
-            action[2:8] += np.linalg.lstsq(slope, wanted[2:8] - after[:, 0], rcond=_LEAST)[0]
+            action[2:8] += np.linalg.lstsq(slope, reference[2:8] - after[:, 0], rcond=_LEAST)[0]
         return np.asarray(np.where(self._moving, action, 0.0))
 
 
@@ -69,7 +69,7 @@ class Brakes:
 
 
 _RELAXED: Final = 1e-3
-"""Violation of a linearised limit from which on a plan counts as relaxed, share of half its range."""
+"""Violation of a linearized limit from which on a plan counts as relaxed, share of half its range."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Moment:
 
     position: Floats
     rate: Floats
-    wanted: Floats
+    reference: Floats
     error: Floats
 
 
@@ -94,10 +94,10 @@ def moment_of(row: NDArray[Any], angle: float) -> Moment:
     turned = measured + 2.0 * np.pi * round((angle - measured) / (2.0 * np.pi))
     position = [*(read(row, name) for name in ("carriage", "displacement", "beta")), np.array([turned])]
     rate = [read(row, name) for name in ("carriage_rate", "velocity", "beta_rate", "turntable_rate")]
-    wanted = np.concatenate([read(row, "wanted_force"), read(row, "wanted_rate")])
-    felt = np.concatenate([read(row, "felt_force"), read(row, "felt_rate")])
+    reference = np.concatenate([read(row, "reference_force"), read(row, "reference_rate")])
+    simulated = np.concatenate([read(row, "simulator_force"), read(row, "simulator_rate")])
     # Observed forces have gravity at rest taken off.
-    return Moment(np.concatenate(position), np.concatenate(rate), wanted + REST, felt - wanted)
+    return Moment(np.concatenate(position), np.concatenate(rate), reference + REST, simulated - reference)
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Counts:
         iterations: Programs solved for them.
         rounds: Duals solved for them.
         unconverged: Plans still on the move after their last program, where there may be several.
-        relaxed: Plans in which a linearised limit could not be kept.
+        relaxed: Plans in which a linearized limit could not be kept.
     """
 
     solves: int = 0
@@ -226,7 +226,7 @@ class PredictiveController:
         memory = self._begun() if memory is None else memory
         moment = moment_of(row, memory.angle)
         sensors = self._planner.perception.advance(memory.sensors, memory.error, moment.error)
-        lasts = self._forecast.remember(memory.lasts, moment.wanted)
+        lasts = self._forecast.remember(memory.lasts, moment.reference)
         memory = replace(memory, angle=moment.position[8], sensors=sensors, error=moment.error, lasts=lasts)
         if memory.age >= self._mpc.every or not memory.solved:
             memory = self._plan(moment, memory, lasts)
@@ -252,7 +252,7 @@ class PredictiveController:
         planned = self._planner(
             moment.position,
             moment.rate,
-            self._forecast(moment.wanted, lasts, memory.sample),
+            self._forecast(moment.reference, lasts, memory.sample),
             grid.at(memory.plan, grid.times + TIME_STEP * memory.age),
             memory.active,
             self._planner.perception.memory(memory.sensors, moment.error),
@@ -323,7 +323,7 @@ def make_controller(
 def make_mpc(
     platform: Platform, parameters: MpcParameters | None = None, name: str = "mpc"
 ) -> PredictiveController | PreviewController:
-    """Linear time-varying predictive control: the machine is linearised once a plan, about the last plan.
+    """Linear time-varying predictive control: the machine is linearized once a plan, about the last plan.
 
     Args:
         platform: The machine.
@@ -338,7 +338,7 @@ def make_mpc(
 #
 # The machine's nine axes are double integrators, so shooting from node to node is exact whatever the
 # accelerations, and the states are eliminated. What is nonlinear are the cues (rotating frames) and the
-# legs; sequential quadratic programming linearises them again about each new plan until it no longer
+# legs; sequential quadratic programming linearizes them again about each new plan until it no longer
 # changes, with a search along each change that takes the exact cost and the exact limits.
 
 

@@ -71,7 +71,7 @@ class Grid:
     def averages(self, dt: float) -> Floats:
         """(n, m) from samples at dt, 2 dt ... to the horizon to one value a node.
 
-        Each node takes the mean under its hat, the line that is 1 there and 0 at its neighbours, so that
+        Each node takes the mean under its hat, the line that is 1 there and 0 at its neighbors, so that
         nothing between two nodes is overlooked. The first takes the sample at its own time.
         """
         count = max(round(self.times[-1] / dt), 1)
@@ -115,7 +115,7 @@ N_CUES: Final = 6
 
 
 @dataclass(frozen=True)
-class Linearisation:
+class Linearization:
     """Values and derivatives at n nodes, k rows each: the cues, then the limits.
 
     Args:
@@ -131,7 +131,7 @@ class Linearisation:
         return np.asarray(self.values + (self.slopes @ moved[:, :, None])[:, :, 0])
 
 
-class Linearised:
+class Linearized:
     """The function for a machine and a number of nodes; its results are overwritten by the next call.
 
     Args:
@@ -152,17 +152,17 @@ class Linearised:
         rows = cs.vertcat(_cue_rows(machine, q, v, a), limits)
         slopes = cs.jacobian(rows, cs.vertcat(q, v, a))
         outputs = [rows, cs.densify(cs.vec(slopes.T))]
-        node = cs.Function("linearised", [q, v, a], outputs).map(nodes)
+        node = cs.Function("linearized", [q, v, a], outputs).map(nodes)
         self._function: Any = compiled(node) if compile else node
         self._inputs = [np.zeros((nodes, N_AXES)) for _ in range(3)]
-        self._result = Linearisation(np.zeros((nodes, rows.numel())), np.zeros((nodes, *slopes.shape)))
+        self._result = Linearization(np.zeros((nodes, rows.numel())), np.zeros((nodes, *slopes.shape)))
         self._buffer, self._evaluate = self._function.buffer()
         for i, array in enumerate(self._inputs):
             self._buffer.set_arg(i, array.data)
         self._buffer.set_res(0, self._result.values.data)
         self._buffer.set_res(1, self._result.slopes.data)
 
-    def __call__(self, position: Floats, rate: Floats, acceleration: Floats) -> Linearisation:
+    def __call__(self, position: Floats, rate: Floats, acceleration: Floats) -> Linearization:
         """The machine about positions, rates and accelerations (n, 9) at the nodes."""
         for array, values in zip(self._inputs, (position, rate, acceleration), strict=True):
             array[...] = values

@@ -5,7 +5,7 @@ node. Cost is the mean over the horizon of the squared cue error in zones, as J,
 
     1/2 sum_j w_j ( |y_j - wanted_j|^2 + position, rate and acceleration, weighted ) + end terms
 
-with the cues y linearised. Every limit is a row whose violation has a price, so it always has a solution.
+with the cues y linearized. Every limit is a row whose violation has a price, so it always has a solution.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...envs.platform import Platform, actuator_limits
 from ...envs.simulator.simulator import N_AXES
 from .parameters import AxisWeights, MpcParameters
-from .prediction import N_CUES, Floats, Grid, Linearisation, cue_scales
+from .prediction import N_CUES, Floats, Grid, Linearization, cue_scales
 
 _TILT: slice = slice(3, 5)
 """Rows of the cab's roll and pitch rate among the cues."""
@@ -43,7 +43,7 @@ class Quadratic:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of the linearised rows, each (n, k), infinite where there is none.
+    """Bounds of the linearized rows, each (n, k), infinite where there is none.
 
     Args:
         lower: Least value.
@@ -91,43 +91,43 @@ class Problem:
         self._regular = hessian.reshape(n * k, n * k)
         self._scale = np.sqrt(grid.weights)[:, None]
 
-    def cost(self, plan: Plan, about: Linearisation, wanted: Floats, sensed: Floats | None) -> Quadratic:
+    def cost(self, plan: Plan, about: Linearization, reference: Floats, sensed: Floats | None) -> Quadratic:
         """The cost about a plan.
 
         Args:
             plan: At the nodes.
-            about: The machine linearised there.
-            wanted: (n, 6) the car's cues, SI.
+            about: The machine linearized there.
+            reference: (n, 6) the car's cues, SI.
             sensed: (n, 6) what the sensors' memory adds to the perceived error, in zones; None for none.
         """
         slope = self.condensed(about.slopes[:, :N_CUES])
         if self._perceived is not None:
-            felt = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
-            slope = np.concatenate([felt, self._cab_share * slope], axis=1)
-        residual = (self._scale * self._error(about, wanted, sensed)).ravel()
+            simulated = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
+            slope = np.concatenate([simulated, self._cab_share * slope], axis=1)
+        residual = (self._scale * self._error(about, reference, sensed)).ravel()
         jacobian = (self._scale[:, :, None] * slope).reshape(len(residual), -1)
         return Quadratic(
             self._regular + jacobian.T @ jacobian, self._motion_gradient(plan) + residual @ jacobian
         )
 
     def merit(
-        self, plan: Plan, about: Linearisation, wanted: Floats, sensed: Floats | None, bounds: Bounds
+        self, plan: Plan, about: Linearization, reference: Floats, sensed: Floats | None, bounds: Bounds
     ) -> float:
         """What a plan costs exactly, with the price of every limit it exceeds; see :meth:`cost`."""
-        error = self._scale * self._error(about, wanted, sensed)
+        error = self._scale * self._error(about, reference, sensed)
         excess = np.maximum(np.maximum(about.values - bounds.upper, bounds.lower - about.values), 0.0)
         hard, soft = np.isfinite(bounds.price), bounds.softness > 0.0
         squares = np.sum(error**2) + np.sum(excess[soft] ** 2 / bounds.softness[soft])
         priced = bounds.price[hard] @ excess[hard]
         return float(0.5 * (squares + self._motion_cost(plan)) + priced)
 
-    def _error(self, about: Linearisation, wanted: Floats, sensed: Floats | None) -> Floats:
+    def _error(self, about: Linearization, reference: Floats, sensed: Floats | None) -> Floats:
         """(n, 6) error of the cues in zones; (n, 12) of what is sensed of them, and a share of themselves."""
-        error = about.values[:, :N_CUES] - wanted / cue_scales()
+        error = about.values[:, :N_CUES] - reference / cue_scales()
         if self._perceived is None:
             return np.asarray(error)
-        felt = np.einsum("cji,ic->jc", self._perceived, error)
-        return np.hstack([felt if sensed is None else felt + sensed, self._cab_share * error])
+        simulated = np.einsum("cji,ic->jc", self._perceived, error)
+        return np.hstack([simulated if sensed is None else simulated + sensed, self._cab_share * error])
 
     def condensed(self, slopes: Floats) -> Floats:
         """(n, r, m) derivatives of rows by the unknowns, from those by their node's motion (n, r, 27)."""
@@ -153,20 +153,20 @@ class Problem:
         acceleration[:, self.axes] = unknowns.reshape(-1, len(self.axes))
         return Plan(self.grid.position @ acceleration, self.grid.rate @ acceleration, acceleration)
 
-    def bounds(self, lower: Floats, upper: Floats, wanted: Floats) -> Bounds:
+    def bounds(self, lower: Floats, upper: Floats, reference: Floats) -> Bounds:
         """Bounds of every row: the machine's limits, and the tilt rate beyond the car's own.
 
         Args:
             lower: (k - 6,) least values of the limit rows.
             upper: (k - 6,) greatest.
-            wanted: (n, 6) the car's cues, SI.
+            reference: (n, 6) the car's cues, SI.
         """
-        p, n = self._parameters, len(wanted)
+        p, n = self._parameters, len(reference)
         free = np.full((n, N_CUES), np.inf)
         low, high, softness = -free, free.copy(), np.zeros((n, N_CUES))
         if p.tilt_rate.weight > 0.0:
             scale = cue_scales()[_TILT]
-            own, limit = wanted[:, _TILT] / scale, p.tilt_rate.limit / scale
+            own, limit = reference[:, _TILT] / scale, p.tilt_rate.limit / scale
             low[:, _TILT] = np.minimum(own, 0.0) - limit
             high[:, _TILT] = np.maximum(own, 0.0) + limit
             softness[:, _TILT] = 1.0 / (p.tilt_rate.weight * self.grid.weights[:, None])

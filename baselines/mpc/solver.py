@@ -17,7 +17,7 @@ from scipy.linalg import lapack
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from .parameters import MpcParameters
-from .prediction import Floats, Linearisation, Linearised, Perception, make_grid
+from .prediction import Floats, Linearization, Linearized, Perception, make_grid
 from .problem import Bounds, Plan, Problem, Quadratic
 
 try:
@@ -42,7 +42,7 @@ class OneThread:
 
 # The solver: limits enter a program only where they matter.
 #
-# Without limits the minimum is a Cholesky factorisation away. Limits that it violates, and those that held
+# Without limits the minimum is a Cholesky factorization away. Limits that it violates, and those that held
 # last time, then get multipliers; with H = L L' and M = L^-1 A' of their rows A, the dual program
 #
 #     min 1/2 lambda' (M'M + softness) lambda + slack' lambda,    0 <= lambda <= price
@@ -93,14 +93,14 @@ class Solution:
 
 
 def solve(
-    problem: Problem, cost: Quadratic, about: Linearisation, bounds: Bounds, guess: Rows, rounds: int
+    problem: Problem, cost: Quadratic, about: Linearization, bounds: Bounds, guess: Rows, rounds: int
 ) -> Solution:
-    """Minimise a cost under the bounds.
+    """Minimize a cost under the bounds.
 
     Args:
         problem: Knows what the unknowns do to the rows.
-        cost: To be minimised.
-        about: The rows, linearised.
+        cost: To be minimized.
+        about: The rows, linearized.
         bounds: Of the rows.
         guess: Rows that may hold, as ``Solution.active``.
         rounds: Most duals.
@@ -142,7 +142,7 @@ def _hard(bounds: Bounds) -> NDArray[np.bool_]:
 
 
 def _with_rows(
-    problem: Problem, about: Linearisation, bounds: Bounds, factor: Floats, free: Floats, working: Rows
+    problem: Problem, about: Linearization, bounds: Bounds, factor: Floats, free: Floats, working: Rows
 ) -> tuple[Floats, Floats] | None:
     """Unknowns and multipliers under some of the rows; None where the solver gives up."""
     side, row = np.divmod(working, about.values.size)
@@ -169,7 +169,7 @@ def _unsolved(problem: Problem, guess: Rows, rounds: int = 0) -> Solution:
     return Solution(problem.change(np.zeros(problem.size)), guess, rounds, 0.0, False)
 
 
-# Plans: linearise, solve, and again where a controller has the time.
+# Plans: linearize, solve, and again where a controller has the time.
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class Planned:
         converged: Whether the last program asked for next to no change, or there was to be but one.
         iterations: Programs solved.
         rounds: Duals solved in all of them.
-        relaxed: Largest violation of a linearised limit in the last one, in shares of half its range.
+        relaxed: Largest violation of a linearized limit in the last one, in shares of half its range.
     """
 
     plan: Plan
@@ -204,7 +204,7 @@ class Planner:
     Args:
         platform: The machine.
         parameters: Of the controller.
-        iterations: Most programs a plan; 1 linearises once.
+        iterations: Most programs a plan; 1 linearizes once.
         tolerance: A step that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
     """
 
@@ -213,7 +213,7 @@ class Planner:
     ) -> None:
         self.grid = make_grid(parameters.nodes)
         self.perception = Perception(self.grid, parameters)
-        self._linearised = Linearised(platform, len(self.grid.times), parameters.margins, parameters.compile)
+        self._linearized = Linearized(platform, len(self.grid.times), parameters.margins, parameters.compile)
         self._problem = Problem(platform, parameters, self.grid, self.perception.response)
         self._iterations, self._tolerance, self._rounds = iterations, tolerance, parameters.rounds
 
@@ -221,7 +221,7 @@ class Planner:
         self,
         position: Floats,
         rate: Floats,
-        wanted: Floats,
+        reference: Floats,
         guess: Floats,
         active: Rows,
         sensed: Floats | None = None,
@@ -231,12 +231,12 @@ class Planner:
         Args:
             position: (9,) now.
             rate: (9,) now.
-            wanted: (n, 6) the car's cues at the nodes, SI.
-            guess: (n, 9) accelerations to linearise about.
+            reference: (n, 6) the car's cues at the nodes, SI.
+            guess: (n, 9) accelerations to linearize about.
             active: Limits that may hold.
             sensed: (n, 6) what the sensors remember, see :meth:`.perceived.Perception.memory`.
         """
-        search = _Search(self._problem, self._linearised, wanted, sensed)
+        search = _Search(self._problem, self._linearized, reference, sensed)
         plan = Plan(*self.grid.motion(position, rate, guess), guess)
         rounds = 0
         for count in range(1, self._iterations + 1):
@@ -258,15 +258,20 @@ class _Search:
     """The programs of one plan."""
 
     def __init__(
-        self, problem: Problem, linearised: Linearised, wanted: Floats, sensed: Floats | None
+        self, problem: Problem, linearized: Linearized, reference: Floats, sensed: Floats | None
     ) -> None:
-        self._problem, self._linearised, self._wanted, self._sensed = problem, linearised, wanted, sensed
-        self._bounds = problem.bounds(linearised.lower, linearised.upper, wanted)
+        self._problem, self._linearized, self._reference, self._sensed = (
+            problem,
+            linearized,
+            reference,
+            sensed,
+        )
+        self._bounds = problem.bounds(linearized.lower, linearized.upper, reference)
 
     def program(self, plan: Plan, active: Rows, rounds: int) -> Solution:
         """Solve the program about a plan."""
         about = self._about(plan)
-        cost = self._problem.cost(plan, about, self._wanted, self._sensed)
+        cost = self._problem.cost(plan, about, self._reference, self._sensed)
         return solve(self._problem, cost, about, self._bounds, active, rounds)
 
     def share(self, plan: Plan, change: Plan) -> float:
@@ -279,10 +284,10 @@ class _Search:
         return 0.0
 
     def _merit(self, plan: Plan) -> float:
-        return self._problem.merit(plan, self._about(plan), self._wanted, self._sensed, self._bounds)
+        return self._problem.merit(plan, self._about(plan), self._reference, self._sensed, self._bounds)
 
-    def _about(self, plan: Plan) -> Linearisation:
-        return self._linearised(plan.position, plan.rate, plan.acceleration)
+    def _about(self, plan: Plan) -> Linearization:
+        return self._linearized(plan.position, plan.rate, plan.acceleration)
 
 
 _LEAST_SHARE: Final = 1.0 / 16.0

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag, solve_discrete_lyapunov
 
 from ...envs.errors import ConfigurationError
 from ...envs.perception import VestibularModel
-from ...envs.perception.models import DiscreteFilter, discretise
+from ...envs.perception.models import DiscreteFilter, discretize
 from ...envs.platform.kernels.step import LEGS, NEARLY_SINGULAR, TURNTABLE
 from ...envs.settings import NonNegative, Positive, configuration
 from ...envs.simulator.simulator import N_AXES
@@ -69,7 +69,7 @@ class OptimumOptions:
 #
 # Canals and otoliths are linear, so what is sensed of the simulator less what is sensed of the car is what
 # they would sense of the difference of both. Its order is that of the published models: two for each otolith,
-# three for each canal, as ``envs.perception.models`` discretises them.
+# three for each canal, as ``envs.perception.models`` discretizes them.
 
 
 Floats = NDArray[np.float64]
@@ -107,8 +107,8 @@ class SensedError:
 
 def sensed_error(model: VestibularModel, dt: float) -> SensedError:
     """The filter at a time step, s; its states are scaled to unit size under white noise."""
-    otolith = discretise(*model.otoliths.transfer_function(), dt)
-    canals = [discretise(*model.canals.transfer_function(axis), dt) for axis in range(3)]
+    otolith = discretize(*model.otoliths.transfer_function(), dt)
+    canals = [discretize(*model.canals.transfer_function(axis), dt) for axis in range(3)]
     parts = [_scaled(part) for part in [otolith] * 3 + canals]
     a, b, c = (np.asarray(block_diag(*(part[i] for part in parts))) for i in range(3))
     sizes = [part[3] for part in parts]
@@ -170,7 +170,7 @@ class Interval:
         x: (m,) states of the sensed error there, empty for J.
         a: (9,) accelerations there.
         b: (9,) accelerations at its last node.
-        wanted: (7, steps) the car's force and rate at its samples, and 1, or 0 after the end of the drive.
+        reference: (7, steps) the car's force and rate at its samples, and 1, or 0 after the end of the drive.
         end: (18 + m,) q, v, x at the last node.
         errors: (6 steps,) errors of all samples in indifference zones.
     """
@@ -180,7 +180,7 @@ class Interval:
     x: Expression
     a: Expression
     b: Expression
-    wanted: Expression
+    reference: Expression
     end: Expression
     errors: Expression
 
@@ -205,7 +205,7 @@ def interval(
     """
     q, v, a, b = (cs.SX.sym(name, N_AXES) for name in "qvab")
     x = cs.SX.sym("x", 0 if sensed is None else len(sensed.a))
-    wanted = cs.SX.sym("wanted", N_CUES + 1, options.steps)
+    reference = cs.SX.sym("reference_cue", N_CUES + 1, options.steps)
     cab = machine.platform.cab
     point = cs.DM(cab.reference_point) + (0.0 if options.objective == "J" else cs.DM(cab.head))
     zones = cs.DM([options.force_zone] * 3 + [options.rate_zone] * 3)
@@ -213,13 +213,13 @@ def interval(
     for k in range(options.steps):
         mean = a + (b - a) * ((k + 0.5) / options.steps)
         position, rate = position + dt * (rate + 0.5 * dt * mean), rate + dt * mean
-        error = (cs.vertcat(*cues(point, position, rate, mean)) - wanted[:N_CUES, k]) / zones
+        error = (cs.vertcat(*cues(point, position, rate, mean)) - reference[:N_CUES, k]) / zones
         if sensed is not None:
-            felt = error
-            error = _sparse(sensed.c) @ memory + cs.DM(sensed.d) * felt
-            memory = _sparse(sensed.a) @ memory + _sparse(sensed.b) @ felt
-        errors.append(error * wanted[N_CUES, k])
-    return Interval(q, v, x, a, b, wanted, cs.vertcat(position, rate, memory), cs.vertcat(*errors))
+            simulated = error
+            error = _sparse(sensed.c) @ memory + cs.DM(sensed.d) * simulated
+            memory = _sparse(sensed.a) @ memory + _sparse(sensed.b) @ simulated
+        errors.append(error * reference[N_CUES, k])
+    return Interval(q, v, x, a, b, reference, cs.vertcat(position, rate, memory), cs.vertcat(*errors))
 
 
 def _sparse(matrix: NDArray[np.float64]) -> Expression:

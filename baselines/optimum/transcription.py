@@ -150,7 +150,7 @@ def blocks_of(part: Interval, limits: NodeLimits, options: OptimumOptions) -> Bl
     def function(name: str, inputs: list[Expression], value: Expression) -> Expression:
         return cs.Function(name, inputs, [value], {"cse": True})
 
-    given = [z, part.wanted]
+    given = [z, part.reference]
     return Blocks(
         cost=function("cost", given, cs.vertcat(cs.sumsqr(errors), cs.sumsqr(own))),
         gradient=function("gradient", given, cs.gradient(cs.sumsqr(residuals), z)),
@@ -206,12 +206,12 @@ def nonzeros(matrix: Expression) -> Expression:
 
 # A window of a drive as a nonlinear program for IPOPT.
 #
-#     minimise    sum of squared errors / steps + effort
+#     minimize    sum of squared errors / steps + effort
 #     subject to  the motion from node to node, and the limits at every node.
 #
 # Variables are [q, v, x, a] of every node, one node behind another; constraints for each interval its end
 # and the limits there. The matrices are given to IPOPT as they follow from the structure, so that nothing is
-# found out by colouring, and a Hessian of Gauss and Newton keeps every step a descent.
+# found out by coloring, and a Hessian of Gauss and Newton keeps every step a descent.
 
 
 _QUIET: Final = {"print_level": 0, "sb": "yes"}
@@ -241,7 +241,7 @@ class Transcription:
         nodes = cs.reshape(self._x, n, intervals + 1)
         self._z = cs.vertcat(nodes[:, :-1], nodes[n - N_AXES :, 1:])
         self._nodes = nodes
-        self._wanted = cs.reshape(self._p, blocks.cost.size1_in(1), -1)
+        self._reference = cs.reshape(self._p, blocks.cost.size1_in(1), -1)
         self.gaps = blocks.state_size * intervals
         self.constraints = self.gaps + blocks.limits.numel_out(0) * (intervals + 1)
         # An attribute: CasADi does not keep it.
@@ -267,17 +267,17 @@ class Transcription:
         return function.map(self.intervals + 1)(self._nodes, *given)
 
     def _cost(self) -> Expression:
-        return cs.sum1(cs.sum2(self._map(self.blocks.cost, self._z, self._wanted)))
+        return cs.sum1(cs.sum2(self._map(self.blocks.cost, self._z, self._reference)))
 
     def _values(self) -> Expression:
         """End of every interval less the next node's state, then the limits at every node."""
-        ends = self._map(self.blocks.end, self._z, self._wanted)
+        ends = self._map(self.blocks.end, self._z, self._reference)
         gaps = ends - self._nodes[: self.blocks.state_size, 1:]
         return cs.vertcat(cs.vec(gaps), cs.vec(self._at_nodes(self.blocks.limits)))
 
     def _gradient(self) -> Expression:
         n = self.blocks.node_size
-        parts = self._map(self.blocks.gradient, self._z, self._wanted)
+        parts = self._map(self.blocks.gradient, self._z, self._reference)
         ahead = cs.vertcat(cs.MX(n - N_AXES, self.intervals), parts[n:, :])
         total = cs.horzcat(parts[:n, :], cs.MX(n, 1)) + cs.horzcat(cs.MX(n, 1), ahead)
         return cs.Function(
@@ -294,7 +294,7 @@ class Transcription:
         intervals, nodes = np.arange(self.intervals), np.arange(self.intervals + 1)
         end_rows, end_columns = triplets(blocks.end_jacobian)
         limit_rows, limit_columns = triplets(blocks.limits_jacobian)
-        ends = self._map(blocks.end_jacobian, self._z, self._wanted)
+        ends = self._map(blocks.end_jacobian, self._z, self._reference)
         place = interval_variables(blocks)[end_columns]
         state = np.arange(states)
         parts = [
@@ -322,10 +322,10 @@ class Transcription:
         return cs.Function("nlp_hess_l", inputs, [total], names, ["triu_hess_gamma_x_x"])
 
     def _cost_hessian(self, scale: Expression) -> Expression:
-        """Of every second interval, and of those between: neighbours overlap."""
+        """Of every second interval, and of those between: neighbors overlap."""
         blocks, size = self.blocks, self._x.numel()
         rows, columns = (interval_variables(blocks)[part] for part in triplets(blocks.hessian))
-        parts = self._map(blocks.hessian, self._z, self._wanted, cs.repmat(scale, 1, self.intervals))
+        parts = self._map(blocks.hessian, self._z, self._reference, cs.repmat(scale, 1, self.intervals))
         values = cs.reshape(nonzeros(parts), len(rows), self.intervals)
         total = cs.MX(size, size)
         for first in range(min(2, self.intervals)):
@@ -344,5 +344,5 @@ class Transcription:
         """(intervals,) cost of the errors in each interval, without that of effort."""
         nodes = x.reshape(-1, self.blocks.node_size).T
         z = np.vstack([nodes[:, :-1], nodes[-N_AXES:, 1:]])
-        wanted = p.reshape(-1, self.blocks.cost.size1_in(1)).T
-        return np.asarray(np.array(self.blocks.cost.map(self.intervals)(z, wanted))[0])
+        reference = p.reshape(-1, self.blocks.cost.size1_in(1)).T
+        return np.asarray(np.array(self.blocks.cost.map(self.intervals)(z, reference))[0])

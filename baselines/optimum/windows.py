@@ -42,7 +42,7 @@ _ACCEPTABLE: Final = {
     "acceptable_dual_inf_tol": 0.5,
     "acceptable_compl_inf_tol": 0.01,
 }
-"""IPOPT also stops where the cost has stood still to a thousandth, and limits are kept to a millimetre."""
+"""IPOPT also stops where the cost has stood still to a thousandth, and limits are kept to a millimeter."""
 
 _CONVERGED: Final = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
@@ -114,7 +114,7 @@ class Problem:
 
     Args:
         platform: The machine.
-        options: What to minimise, and how.
+        options: What to minimize, and how.
         vestibular: The driver's perception; None to take errors as they are.
         dt: Time step of the machine, s.
         margin: Share of the limits of speed and acceleration to keep free.
@@ -148,22 +148,22 @@ class Problem:
         machine, options = self._machine.platform, self.options
         return _parts(machine, options, self._vestibular, self.dt, self.margin, self.clear)
 
-    def solve(self, wanted: Floats, start: Start) -> Solution:
+    def solve(self, reference: Floats, start: Start) -> Solution:
         """The best accelerations for a window.
 
         Args:
-            wanted: (n, 6) force and rate of the car at the n samples after the start.
+            reference: (n, 6) force and rate of the car at the n samples after the start.
             start: Where the window begins.
 
         Raises:
             KeyboardInterrupt: Ctrl-C was pressed.
         """
-        count = -(-len(wanted) // self.options.steps)
-        given = self._given(wanted, count)
+        count = -(-len(reference) // self.options.steps)
+        given = self._given(reference, count)
         program = self._transcription(count)
         lower, upper = self._bounds(count, start)
         least, most = self._ranges(program)
-        guess, before = self._guess(wanted, given, count, start)
+        guess, before = self._guess(reference, given, count, start)
         with self._watch.solving():
             result = program.solver(x0=guess, p=given, lbx=lower, ubx=upper, lbg=least, ubg=most)
         stats = program.solver.stats()
@@ -171,7 +171,7 @@ class Problem:
         nodes = x.reshape(count + 1, -1)
         return Solution(
             nodes,
-            mean_accelerations(nodes[:, -N_AXES:], self.options.steps)[: len(wanted)],
+            mean_accelerations(nodes[:, -N_AXES:], self.options.steps)[: len(reference)],
             program.errors(x, given) * self.options.steps,
             stats["return_status"] in _CONVERGED,
             int(stats["iter_count"]) + before,
@@ -194,14 +194,14 @@ class Problem:
             **_ACCEPTABLE,
         }
 
-    def _given(self, wanted: Floats, count: int) -> Floats:
+    def _given(self, reference: Floats, count: int) -> Floats:
         """The car's cues at all samples, and whether they count; what is after the end does not."""
         rows = np.zeros((count * self.options.steps, N_CUES + 1))
-        rows[: len(wanted), :N_CUES] = wanted
-        rows[: len(wanted), N_CUES] = 1.0
+        rows[: len(reference), :N_CUES] = reference
+        rows[: len(reference), N_CUES] = 1.0
         return rows.ravel()
 
-    def _guess(self, wanted: Floats, given: Floats, count: int, start: Start) -> tuple[Floats, int]:
+    def _guess(self, reference: Floats, given: Floats, count: int, start: Start) -> tuple[Floats, int]:
         """A motion without gaps, and the iterations it took.
 
         Standing still for errors as they are. What is sensed begins with the plan for those: from far off,
@@ -211,7 +211,7 @@ class Problem:
         nodes[:, :N_AXES] = start.position
         if self._plain is None:
             return nodes.ravel(), 0
-        plain = self._plain.solve(wanted, replace(start, memory=np.zeros(0)))
+        plain = self._plain.solve(reference, replace(start, memory=np.zeros(0)))
         nodes[:, : 2 * N_AXES], nodes[:, -N_AXES:] = np.split(plain.nodes, [2 * N_AXES], axis=1)
         nodes[0, 2 * N_AXES : -N_AXES] = start.memory
         rows = given.reshape(count, self.options.steps, N_CUES + 1)
@@ -314,7 +314,7 @@ class Planner:
         self._share, self._tally = 0.0, _Tally()
         head = platform.cab.head
         force = cues.specific_force if options.objective == "J" else cues.at_point(head)
-        self._wanted = np.hstack([force, cues.angular_velocity])
+        self._reference = np.hstack([force, cues.angular_velocity])
         self._zones = np.repeat([options.force_zone, options.rate_zone], 3)
 
         def told(iterations: int) -> None:
@@ -357,7 +357,7 @@ class Planner:
         """The kept part of a window; braking where no plan keeps the limits."""
         tally, options = self._tally, self._options
         before, begins = self._player.snapshot(), self._begins()
-        ahead = self._wanted[window.first + 1 : window.last + 1]
+        ahead = self._reference[window.first + 1 : window.last + 1]
         length = window.kept - window.first
         margin, clear = options.margin, False
         for attempt in range(options.widenings + 1):
@@ -385,19 +385,26 @@ class Planner:
         state, sensed = self._player.state, self._problem(self._options.margin).sensed
         memory = np.zeros(0)
         if sensed is not None:
-            felt, wanted = state["felt"], state["wanted"]
-            difference = (felt["head_force"] - wanted["head_force"], felt["rate"] - wanted["rate"])
+            simulated, reference = state["simulator_cue"], state["reference_cue"]
+            difference = (
+                simulated["head_force"] - reference["head_force"],
+                simulated["rate"] - reference["rate"],
+            )
             error = np.concatenate(difference) / self._zones
             filters = (
-                state["vestibular_felt"]["otoliths"] - state["vestibular_wanted"]["otoliths"],
-                state["vestibular_felt"]["canals"] - state["vestibular_wanted"]["canals"],
+                state["vestibular_simulator"]["otoliths"] - state["vestibular_reference"]["otoliths"],
+                state["vestibular_simulator"]["canals"] - state["vestibular_reference"]["canals"],
             )
             memory = sensed.ahead(np.vstack(filters) / self._zones[:, None], error)
         return Start(self._player.positions(), self._player.rates(), memory)
 
     def _costs(self, states: NDArray[np.void]) -> Floats:
-        """(n,) squared errors in indifference zones, of what is felt or of what is sensed."""
-        own = "" if self._options.objective == "J" else "sensed_"
-        felt, wanted = states[f"{own}felt"], states[f"{own}wanted"]
-        errors = np.hstack([felt["force"] - wanted["force"], felt["rate"] - wanted["rate"]]) / self._zones
+        """(n,) squared errors of the cues, or of the perceived cues, in indifference zones."""
+        perceived = self._options.objective == "perceived"
+        simulated = states["perceived_simulator" if perceived else "simulator_cue"]
+        reference = states["perceived_reference" if perceived else "reference_cue"]
+        errors = (
+            np.hstack([simulated["force"] - reference["force"], simulated["rate"] - reference["rate"]])
+            / self._zones
+        )
         return np.asarray(np.sum(errors**2, axis=1), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What a search minimises: J over drives, in which no limit of the machine is met."""
+"""What a search minimizes: J over drives, in which no limit of the machine is met."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Judgement:
         perceived_error: Mean perceived J.
         at_limit: Share of time in which any limit is met.
         violation: The same of the drives in which none may be met.
-        cost: What the search minimises.
+        cost: What the search minimizes.
         limited: (sets, drives) the same of each drive; 0 in those that are spared.
     """
 
@@ -54,7 +54,7 @@ class Objective:
     Args:
         drives: Cue traces of the same time step.
         platform: The machine, without lag or dead time.
-        measure: What is minimised.
+        measure: What is minimized.
         threads: Launches side by side.
         spared: Drives in which limits may be met: what that does to J is all it costs.
 

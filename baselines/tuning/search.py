@@ -122,7 +122,7 @@ class Search:
 
     Args:
         options: Of the search.
-        objective: What it minimises; its drives are those of the options.
+        objective: What it minimizes; its drives are those of the options.
         names: Of platform and car, as the file holds them.
         path: File that is written after every step; None for none.
         command: That begins it, for people.

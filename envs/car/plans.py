@@ -20,7 +20,7 @@ STEP: Final = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Points on a line, one every :data:`STEP` metres of it; after its end it goes straight on.
+    """Points on a line, one every :data:`STEP` meters of it; after its end it goes straight on.
 
     Args:
         x: North, m.
@@ -28,7 +28,7 @@ class Path:
         heading: Positive to the right, rad.
         curvature: Positive in a right bend, 1/m.
         grade: Slope, rad, positive uphill.
-        grade_per_metre: Derivative of the slope along the path, rad/m.
+        grade_per_meter: Derivative of the slope along the path, rad/m.
     """
 
     x: Floats
@@ -36,7 +36,7 @@ class Path:
     heading: Floats
     curvature: Floats
     grade: Floats
-    grade_per_metre: Floats
+    grade_per_meter: Floats
 
     def __post_init__(self) -> None:
         table = self.table()
@@ -53,11 +53,11 @@ class Path:
 
     def table(self) -> Floats:
         """(n, 6) all columns, in the order of the fields."""
-        columns = (self.x, self.y, self.heading, self.curvature, self.grade, self.grade_per_metre)
+        columns = (self.x, self.y, self.heading, self.curvature, self.grade, self.grade_per_meter)
         return np.column_stack(columns)
 
     def delayed(self, distance: float) -> Path:
-        """The same path after a straight of about ``distance`` metres (a whole number of steps)."""
+        """The same path after a straight of about ``distance`` meters (a whole number of steps)."""
         points = STEP * np.arange(-round(distance / STEP), 0)
         zero = np.zeros_like(points)
         c, s = np.cos(self.heading[0]), np.sin(self.heading[0])
@@ -102,7 +102,7 @@ def clothoids(knots: Sequence[tuple[float, float]], length: float) -> Floats:
 def bend(curvature: float, angle: float, transition: float) -> Floats:
     """Curvature every :data:`STEP` of a bend through ``angle``, rad, in the sense of ``curvature``, 1/m.
 
-    Clothoids of ``transition`` metres lead in and out; a bend too short for them is flattened.
+    Clothoids of ``transition`` meters lead in and out; a bend too short for them is flattened.
     """
     top = min(abs(curvature), abs(angle) / transition)
     arc = max(abs(angle) / top - transition, 0.0)

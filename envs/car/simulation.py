@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ..arrays import FLOAT, vec6
 from ..cues import CueTrace
 from ..errors import DataError
-from ..maneuvers.road_roughness import Unevenness, shaking
 from .kernels.driver import COLUMNS, SUBSTEPS, Driver, DriverParameters, Row, Task, drive_all, vec4
 from .kernels.vehicle import CarParameters
 from .plans import DT, Path, Schedule, clothoids
+from .road_roughness import RoadRoughness, shaking
 from .vehicles import Car
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Plan:
         steering: (n,) steering-wheel angles, rad, instead of following the path; one a sample of the
             schedule.
         driver: Who drives; the default driver, or a :data:`ROBOT` where ``steering`` is given.
-        unevenness: Of the road; None for a smooth one.
+        roughness: Of the road; None for a smooth one.
         source: For reports.
     """
 
@@ -50,7 +50,7 @@ class Plan:
     schedule: Schedule
     steering: Floats | None = None
     driver: Driver | None = None
-    unevenness: Unevenness | None = None
+    roughness: RoadRoughness | None = None
     source: str = field(default="")
 
     def __post_init__(self) -> None:
@@ -149,7 +149,7 @@ def _trace(plan: Plan, rows: Floats) -> CueTrace:
             f"{plan.name}: {plan.car.name} left the range of the vehicle model; ask for less speed or bend"
         )
     force, rate, rate_derivative = rows[:, 0:3], rows[:, 3:6], rows[:, 6:9]
-    if plan.unevenness is not None:
+    if plan.roughness is not None:
         distance = np.cumsum(DT * rows[:, 9 + _SPEED])
         added = shaking(plan.car, plan.unevenness, distance, DT)
         force, rate = force + added.force, rate + added.rate

@@ -118,7 +118,7 @@ class Drivetrain:
 
 @configuration
 class Car:
-    """A car. Lengths in metres, body axes x forward, y right, z down, origin at the c.g.
+    """A car. Lengths in meters, body axes x forward, y right, z down, origin at the c.g.
 
     Args:
         name: What it is called on the command line.

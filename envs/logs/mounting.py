@@ -168,9 +168,9 @@ def speed_delay(evidence: Evidence) -> float:
 
 
 def _explained(basis: Floats, target: Floats) -> float:
-    centred = target - target.mean()
-    total = float(centred @ centred)
-    return float(np.sum((basis.T @ centred) ** 2)) / total if total > 0.0 else 0.0
+    centered = target - target.mean()
+    total = float(centered @ centered)
+    return float(np.sum((basis.T @ centered) ** 2)) / total if total > 0.0 else 0.0
 
 
 def correlation(a: Floats, b: Floats) -> float:
@@ -234,9 +234,9 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
         found if given is None else math.radians(given)
         for given, found in zip((options.roll_deg, options.pitch_deg), level(rest), strict=True)
     )
-    levelled = Mounting(roll, pitch)
-    rate_sign, rate_course = _rate_sign(evidence, levelled, options.rate_sign)
-    yaw, lateral_sign = _heading(evidence, levelled, rate_sign, options)
+    leveled = Mounting(roll, pitch)
+    rate_sign, rate_course = _rate_sign(evidence, leveled, options.rate_sign)
+    yaw, lateral_sign = _heading(evidence, leveled, rate_sign, options)
     mounting = Mounting(roll, pitch, yaw, lateral_sign, rate_sign)
     bias, bias_from = _rate_bias(evidence, mounting, options)
     force_speed, force_turn = _agreement(evidence, mounting)
@@ -275,11 +275,11 @@ def _turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
     return np.asarray(evidence.speed * (yaw_rate - yaw_rate.mean()))
 
 
-def _rate_sign(evidence: Evidence, levelled: Mounting, choice: Sign) -> tuple[int, float | None]:
+def _rate_sign(evidence: Evidence, leveled: Mounting, choice: Sign) -> tuple[int, float | None]:
     """Sense of the yaw rate: its integral has to follow the course over ground."""
     if evidence.course is None:
         return _chosen(choice, 1), None
-    heading = np.cumsum(levelled.rate_in_car(evidence.rate)[:, 2]) * evidence.dt
+    heading = np.cumsum(leveled.rate_in_car(evidence.rate)[:, 2]) * evidence.dt
     found = correlation(_detrended(heading), _detrended(evidence.course))
     sign = _chosen(choice, -1 if found < -CLEAR else 1)
     return sign, sign * found
@@ -293,17 +293,17 @@ def _detrended(values: Floats) -> Floats:
 
 
 def _heading(
-    evidence: Evidence, levelled: Mounting, rate_sign: int, options: ImportOptions
+    evidence: Evidence, leveled: Mounting, rate_sign: int, options: ImportOptions
 ) -> tuple[float, int]:
     """Yaw of the mounting, rad, and the sense of its lateral axis.
 
-    For each sense, the turn psi that maximises
-    sum dv/dt f_x + v r f_y, with f_x + i f_y the levelled force turned by psi.
+    For each sense, the turn psi that maximizes
+    sum dv/dt f_x + v r f_y, with f_x + i f_y the leveled force turned by psi.
     """
-    force = levelled.force_in_car(evidence.force)[:, :2]
+    force = leveled.force_in_car(evidence.force)[:, :2]
     x, y = (force - force.mean(axis=0)).T
     along = evidence.speed_rate - evidence.speed_rate.mean()
-    across = _turn(evidence, rate_sign * levelled.rate_in_car(evidence.rate)[:, 2])
+    across = _turn(evidence, rate_sign * leveled.rate_in_car(evidence.rate)[:, 2])
     across = across - across.mean()
 
     def fit(sign: int) -> tuple[float, float]:
@@ -316,7 +316,7 @@ def _heading(
 
     mirrored = options.lateral_sign == "flip"
     if options.lateral_sign == "estimate" and fit(-1)[0] > fit(1)[0]:
-        trial = Mounting(levelled.roll, levelled.pitch, fit(-1)[1], -1, rate_sign)
+        trial = Mounting(leveled.roll, leveled.pitch, fit(-1)[1], -1, rate_sign)
         # A reflection shows only where both axes are excited.
         mirrored = min(_agreement(evidence, trial)) >= CLEAR
     sign = -1 if mirrored else 1

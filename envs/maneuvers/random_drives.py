@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ..car.plans import STEP, Path
+from ..car.road_roughness import RoadRoughness
 from ..car.simulation import Plan, simulate
 from ..car.vehicles import Car, car_names, get_car
 from ..cues import CueTrace
 from ..errors import ConfigurationError, UnknownNameError
 from ..settings import NonNegative, configuration
-from .road_roughness import Unevenness
 from .roads import KINDS, Road, Style, along_path, speed_limit
 
 Floats = NDArray[np.float64]
@@ -97,7 +97,7 @@ class RandomDrives:
         rng = np.random.default_rng((seed, _UNEVENNESS_STREAM))
         roughness = 1e-6 * float(rng.uniform(*np.sqrt(self.roughness))) ** 2
         length = float(plan.schedule.distance[-1]) + plan.car.length
-        return replace(plan, unevenness=Unevenness.drawn(roughness, length, rng))
+        return replace(plan, roughness=RoadRoughness.drawn(roughness, length, rng))
 
 
 def random_drive(

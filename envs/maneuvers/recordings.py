@@ -1,6 +1,6 @@
 """Recorded drives that come with the package.
 
-Each lies in a folder of its own under ``recorded``, with the notice of its licence and the
+Each lies in a folder of its own under ``recorded``, with the notice of its license and the
 command that converted it from the published log.
 """
 

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from ..arrays import mat33, real, vec3
-from .models import DiscreteFilter, VestibularModel, discretise
+from .models import DiscreteFilter, VestibularModel, discretize
 
 
 @wp.struct
@@ -116,8 +116,8 @@ def vestibular_parameters(model: VestibularModel, dt: float) -> Any:
     """The kernel's :class:`Vestibular` of a model at a time step, s."""
     parameters: Any = Vestibular()
     for axis, name in enumerate(("canal_x", "canal_y", "canal_z")):
-        setattr(parameters, name, _third_order(discretise(*model.canals.transfer_function(axis), dt)))
-    parameters.otolith = _third_order(discretise(*model.otoliths.transfer_function(), dt))
+        setattr(parameters, name, _third_order(discretize(*model.canals.transfer_function(axis), dt)))
+    parameters.otolith = _third_order(discretize(*model.otoliths.transfer_function(), dt))
     return parameters
 
 

@@ -1,4 +1,4 @@
-"""Published models of the human vestibular system, and their exact discretisation.
+"""Published models of the human vestibular system, and their exact discretization.
 
 Semicircular canals sense angular velocity, otoliths specific force, each axis by itself, in the head
 frame F_P. Otolith outputs are divided by the model's static gain (0.4), so both signals carry the unit of
@@ -134,7 +134,7 @@ class DiscreteFilter:
     rest: NDArray[np.float64]
 
 
-def discretise(numerator: NDArray[np.float64], denominator: NDArray[np.float64], dt: float) -> DiscreteFilter:
+def discretize(numerator: NDArray[np.float64], denominator: NDArray[np.float64], dt: float) -> DiscreteFilter:
     """A transfer function sampled exactly for inputs that are straight between samples."""
     system = signal.cont2discrete(signal.tf2ss(numerator, denominator), dt, method="foh")
     order = system[0].shape[0]

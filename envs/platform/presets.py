@@ -91,7 +91,7 @@ def joint_pairs(radius: float, spacing: float, first: float) -> Joints:
 def paired_hexapod(upper: tuple[float, float], lower: tuple[float, float]) -> tuple[Joints, Joints]:
     """Joints A_i and B_i of a hexapod given by radius and pair spacing above and below.
 
-    Pairs above stand at 0, 120 and 240 degrees, pairs below between them; each leg joins neighbours.
+    Pairs above stand at 0, 120 and 240 degrees, pairs below between them; each leg joins neighbors.
     """
     above = joint_pairs(*upper, first=0.0)
     below = joint_pairs(*lower, first=math.pi / 3.0)

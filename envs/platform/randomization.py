@@ -27,12 +27,12 @@ machine after the first of a generator."""
 
 
 @configuration
-class BuildRanges:
+class PlatformRanges:
     """How drawn machines differ from a given one. Each factor is drawn by itself, evenly within its range.
 
     Args:
         travel: Factor on the carriage's strokes, and another on the legs'.
-        size: Factor on the hexapod as a whole: joints about their centres, height, and the legs' strokes.
+        size: Factor on the hexapod as a whole: joints about their centers, height, and the legs' strokes.
         shape: Three factors beside it: on the upper joints, on the lower joints, and on the height.
         rates: Factors on velocity and acceleration limits, six: of carriage, legs and turntable.
         turntable_travel: Half the travel of a turntable that has ends, rad.
@@ -57,7 +57,9 @@ class BuildRanges:
                 raise ValueError(f"{name} must be a range from low to high, found {[low, high]}")
 
 
-def drawn_machine(platform: Platform, ranges: BuildRanges, rng: np.random.Generator, name: str) -> Platform:
+def random_platform(
+    platform: Platform, ranges: PlatformRanges, rng: np.random.Generator, name: str
+) -> Platform:
     """A machine of another build that holds its platform at neutral.
 
     Args:
@@ -78,12 +80,12 @@ def drawn_machine(platform: Platform, ranges: BuildRanges, rng: np.random.Genera
             continue
         return replace(made, name=name, description=f"{platform.name} in another build")
     raise ConfigurationError(
-        f"randomisation.build: none of {_TRIES} machines drawn around {platform.name!r} closes, the last one "
+        f"randomization.build: none of {_TRIES} machines drawn around {platform.name!r} closes, the last one "
         f"because {reason}; narrow size, shape or travel"
     )
 
 
-def _built(platform: Platform, ranges: BuildRanges, drawn: np.ndarray) -> Platform:
+def _built(platform: Platform, ranges: PlatformRanges, drawn: np.ndarray) -> Platform:
     def within(limits: Range, draw: int) -> float:
         return float(limits[0] + (limits[1] - limits[0]) * drawn[draw])
 
@@ -120,9 +122,9 @@ def resized(
     Args:
         hexapod: The one it is made of.
         size: Factor on everything: with this alone legs and strokes are as those of a similar hexapod.
-        upper: Factor on the upper joints about their centre.
+        upper: Factor on the upper joints about their center.
         lower: Factor on the lower joints about theirs.
-        height: Factor on the way between the two centres at neutral.
+        height: Factor on the way between the two centers at neutral.
     """
     above, below = (np.array(joints) for joints in (hexapod.upper_joints, hexapod.lower_joints))
     middles = above.mean(axis=0), below.mean(axis=0)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MotionCueingError
-from .theme import AMBIENT, BACKDROP, DIFFUSE, LIGHT, SHININESS, SKYLIGHT, TEXT, Colour
+from .theme import AMBIENT, BACKDROP, DIFFUSE, LIGHT, SHININESS, SKYLIGHT, TEXT, Color
 
 
 class RenderingUnavailableError(MotionCueingError, ImportError):
@@ -67,15 +67,15 @@ class Camera:
 
     Args:
         position: (3,) m, in F_I.
-        target: (3,) m, in F_I; appears at ``centre``.
+        target: (3,) m, in F_I; appears at ``center``.
         focal: Focal length, pixels.
-        centre: Pixel (x, y) of the target; x to the right, y down.
+        center: Pixel (x, y) of the target; x to the right, y down.
     """
 
     position: Floats
     target: Floats
     focal: float
-    centre: tuple[float, float]
+    center: tuple[float, float]
 
     @cached_property
     def axes(self) -> Floats:
@@ -92,7 +92,7 @@ class Camera:
 
     def pixels(self, view: Floats) -> Floats:
         """Pixels (..., 2) of points (..., 3) in front of the camera, given by :meth:`view`."""
-        return np.asarray(view[..., :2] * (self.focal / view[..., 2:]) + self.centre)
+        return np.asarray(view[..., :2] * (self.focal / view[..., 2:]) + self.center)
 
     def project(self, points: Floats) -> Floats:
         """Pixels (..., 2) of points (..., 3) of F_I in front of the camera."""
@@ -105,7 +105,7 @@ def orbit(
     azimuth: float,
     elevation: float,
     focal: float,
-    centre: tuple[float, float],
+    center: tuple[float, float],
 ) -> Camera:
     """A camera on a sphere around its target.
 
@@ -115,11 +115,11 @@ def orbit(
         azimuth: Where the camera stands, from x towards y, rad.
         elevation: Above the horizontal, rad.
         focal: Focal length, pixels.
-        centre: Pixel of the target.
+        center: Pixel of the target.
     """
     level = np.cos(elevation)
     offset = np.array([level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)])
-    return Camera(target + distance * offset, target, focal, centre)
+    return Camera(target + distance * offset, target, focal, center)
 
 
 def clip_near(polygon: Floats) -> Floats:
@@ -163,14 +163,14 @@ class Mesh:
     Args:
         vertices: (v, 3) m.
         faces: (f, 4) indices of vertices.
-        colours: (f, 3) 0 to 255.
+        colors: (f, 3) 0 to 255.
         gloss: (f,) strength of the highlight, 0 to 1.
         opacity: (f,) 1 for all but glass.
     """
 
     vertices: Floats
     faces: Ints
-    colours: Floats
+    colors: Floats
     gloss: Floats
     opacity: Floats
 
@@ -178,21 +178,21 @@ class Mesh:
         """The mesh elsewhere, m."""
         return replace(self, vertices=self.vertices + np.asarray(offset))
 
-    def flipped(self, colour: Colour) -> Mesh:
-        """The same surface seen from inside, in a dull colour of its own."""
-        return mesh(self.vertices, self.faces[:, ::-1], colour)
+    def flipped(self, color: Color) -> Mesh:
+        """The same surface seen from inside, in a dull color of its own."""
+        return mesh(self.vertices, self.faces[:, ::-1], color)
 
     def chosen(self, faces: NDArray[Any]) -> Mesh:
         """Some of the faces, by index or mask."""
         return Mesh(
-            self.vertices, self.faces[faces], self.colours[faces], self.gloss[faces], self.opacity[faces]
+            self.vertices, self.faces[faces], self.colors[faces], self.gloss[faces], self.opacity[faces]
         )
 
 
-def mesh(vertices: Floats, faces: Ints, colour: Colour, gloss: float = 0.0) -> Mesh:
-    """A mesh of one colour."""
+def mesh(vertices: Floats, faces: Ints, color: Color, gloss: float = 0.0) -> Mesh:
+    """A mesh of one color."""
     n = len(faces)
-    return Mesh(vertices, faces, np.tile(np.array(colour, float), (n, 1)), np.full(n, gloss), np.ones(n))
+    return Mesh(vertices, faces, np.tile(np.array(color, float), (n, 1)), np.full(n, gloss), np.ones(n))
 
 
 def joined(*meshes: Mesh) -> Mesh:
@@ -201,7 +201,7 @@ def joined(*meshes: Mesh) -> Mesh:
     return Mesh(
         np.concatenate([m.vertices for m in meshes]),
         np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
-        np.concatenate([m.colours for m in meshes]),
+        np.concatenate([m.colors for m in meshes]),
         np.concatenate([m.gloss for m in meshes]),
         np.concatenate([m.opacity for m in meshes]),
     )
@@ -221,20 +221,20 @@ def cap(n: int, first: int, top: bool) -> Ints:
     return strip[:, ::-1] if top else strip
 
 
-def prism(outline: Floats, top: float, bottom: float, colour: Colour, gloss: float = 0.0) -> Mesh:
+def prism(outline: Floats, top: float, bottom: float, color: Color, gloss: float = 0.0) -> Mesh:
     """A vertical prism.
 
     Args:
         outline: (n, 2) convex, turning from x to y.
         top: z of its upper face, m.
         bottom: z of its lower face, m.
-        colour: Of all faces.
+        color: Of all faces.
         gloss: Of all faces.
     """
     n = len(outline)
     rings = [np.column_stack([outline, np.full(n, z)]) for z in (top, bottom)]
     faces = np.concatenate([ring_walls(n, 2), cap(n, 0, True), cap(n, n, False)])
-    return mesh(np.concatenate(rings), faces, colour, gloss)
+    return mesh(np.concatenate(rings), faces, color, gloss)
 
 
 def circle(radius: float, sides: int) -> Floats:
@@ -243,13 +243,13 @@ def circle(radius: float, sides: int) -> Floats:
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def box(low: ArrayLike, high: ArrayLike, colour: Colour, gloss: float = 0.0) -> Mesh:
+def box(low: ArrayLike, high: ArrayLike, color: Color, gloss: float = 0.0) -> Mesh:
     """A box between two corners, m."""
     (x0, y0, z0), (x1, y1, z1) = np.asarray(low, float), np.asarray(high, float)
-    return prism(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), z0, z1, colour, gloss)
+    return prism(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), z0, z1, color, gloss)
 
 
-def sphere(radius: float, colour: Colour, sides: int = 12, gloss: float = 0.0) -> Mesh:
+def sphere(radius: float, color: Color, sides: int = 12, gloss: float = 0.0) -> Mesh:
     """A sphere around the origin."""
     polar = np.linspace(0.06, np.pi - 0.06, sides // 2 + 1)
     rings = [
@@ -258,15 +258,15 @@ def sphere(radius: float, colour: Colour, sides: int = 12, gloss: float = 0.0) -
     ]
     last = sides * (len(rings) - 1)
     faces = np.concatenate([ring_walls(sides, len(rings)), cap(sides, 0, True), cap(sides, last, False)])
-    return mesh(np.concatenate(rings), faces, colour, gloss)
+    return mesh(np.concatenate(rings), faces, color, gloss)
 
 
 def cylinder(
-    start: ArrayLike, end: ArrayLike, radius: float, colour: Colour, gloss: float = 0.0, sides: int = 14
+    start: ArrayLike, end: ArrayLike, radius: float, color: Color, gloss: float = 0.0, sides: int = 14
 ) -> Mesh:
     """A cylinder from one point to another, m."""
     start, end = np.asarray(start, float), np.asarray(end, float)
-    solid = prism(circle(radius, sides), 0.0, float(np.linalg.norm(end - start)), colour, gloss)
+    solid = prism(circle(radius, sides), 0.0, float(np.linalg.norm(end - start)), color, gloss)
     return replace(solid, vertices=solid.vertices @ along(end - start).T + start)
 
 
@@ -316,36 +316,36 @@ class Painter:
         seen, distance = seen[clear], distance[clear]
         order = np.lexsort((-distance, layer[seen]))
         seen, distance = seen[order], distance[order]
-        colours = shaded(mesh.chosen(seen), normals[seen], sight[seen] / distance[:, None])
-        self._faces(self.camera.view(corners[seen]), self._faded(colours, distance), mesh.opacity[seen])
+        colors = shaded(mesh.chosen(seen), normals[seen], sight[seen] / distance[:, None])
+        self._faces(self.camera.view(corners[seen]), self._faded(colors, distance), mesh.opacity[seen])
 
-    def _faces(self, view: Floats, colours: Floats, opacity: Floats) -> None:
+    def _faces(self, view: Floats, colors: Floats, opacity: Floats) -> None:
         near = np.asarray(view[..., 2] < NEAR)
         whole: NDArray[np.bool_] = ~np.any(near, axis=1)
         projected = self.camera.pixels(np.where(whole[:, None, None], view, 1.0))
         shown = np.flatnonzero(np.where(whole, self._on_picture(projected), ~np.all(near, axis=1))).tolist()
-        pixels, rounded = projected.tolist(), np.clip(colours, 0.0, 255.0).astype(int).tolist()
+        pixels, rounded = projected.tolist(), np.clip(colors, 0.0, 255.0).astype(int).tolist()
         for i in shown:
-            colour = rounded[i]
+            color = rounded[i]
             points = pixels[i] if whole[i] else self.camera.pixels(clip_near(view[i])).tolist()
             if opacity[i] > _OPAQUE:
-                self._draw.polygon(self.surface, colour, points)
+                self._draw.polygon(self.surface, color, points)
             else:
-                self._blend.filled_polygon(self.surface, points, (*colour, round(255 * opacity[i])))
+                self._blend.filled_polygon(self.surface, points, (*color, round(255 * opacity[i])))
 
-    def lines(self, start: Floats, end: Floats, colour: Colour, width: float) -> None:
+    def lines(self, start: Floats, end: Floats, color: Color, width: float) -> None:
         """Draw segments (n, 3) of F_I, each faded by its distance; the width is in pixels."""
         a, b = clip_segments(self.camera.view(start), self.camera.view(end))
         distance = _length(0.5 * (a + b))
         shown = self._fog(distance) < _INVISIBLE
         a, b, distance = self.camera.pixels(a[shown]), self.camera.pixels(b[shown]), distance[shown]
-        colours = self._faded(np.tile(np.array(colour, float), (len(a), 1)), distance)
+        colors = self._faded(np.tile(np.array(color, float), (len(a), 1)), distance)
         corners = strokes(a, b, width)
         inside = self._on_picture(corners)
-        for corner, c in zip(corners[inside].tolist(), colours[inside].astype(int).tolist(), strict=True):
+        for corner, c in zip(corners[inside].tolist(), colors[inside].astype(int).tolist(), strict=True):
             self._draw.polygon(self.surface, c, corner)
 
-    def arrow(self, start: Floats, tip: Floats, colour: Colour) -> None:
+    def arrow(self, start: Floats, tip: Floats, color: Color) -> None:
         """An arrow between two points (3,) of F_I in front of the camera; its width is that of the paper."""
         a, b = self.camera.project(np.stack([start, tip]))
         size = self.surface.get_height() / 720.0
@@ -356,9 +356,9 @@ class Painter:
         across = np.array([-forward[1], forward[0]])
         neck = b - min(13.0 * size, 0.6 * length) * forward
         shaft = strokes(a[None], neck[None], 3.4 * size)[0]
-        self._draw.polygon(self.surface, colour, shaft.tolist())
+        self._draw.polygon(self.surface, color, shaft.tolist())
         barb = 5.5 * size * across
-        self._draw.polygon(self.surface, colour, [tuple(b), tuple(neck + barb), tuple(neck - barb)])
+        self._draw.polygon(self.surface, color, [tuple(b), tuple(neck + barb), tuple(neck - barb)])
 
     def _on_picture(self, pixels: Floats) -> NDArray[np.bool_]:
         """(n,) Which polygons (n, k, 2) may show: pygame would scan the others row by row."""
@@ -369,9 +369,9 @@ class Painter:
         near, far = self.fog
         return np.clip((distance - near) / (far - near), 0.0, 1.0)
 
-    def _faded(self, colours: Floats, distance: Floats) -> Floats:
+    def _faded(self, colors: Floats, distance: Floats) -> Floats:
         weight = self._fog(distance)[:, None]
-        return np.asarray(colours * (1.0 - weight) + np.array(BACKDROP) * weight)
+        return np.asarray(colors * (1.0 - weight) + np.array(BACKDROP) * weight)
 
 
 def strokes(start: Floats, end: Floats, width: float) -> Floats:
@@ -396,10 +396,10 @@ def _length(vectors: Floats) -> Floats:
 
 
 def shaded(mesh: Mesh, normals: Floats, sight: Floats) -> NDArray[np.float64]:
-    """(f, 3) Colours of the faces under the lamp.
+    """(f, 3) Colors of the faces under the lamp.
 
     Args:
-        mesh: Its own colours and gloss.
+        mesh: Its own colors and gloss.
         normals: (f, 3) outward unit normals in F_I.
         sight: (f, 3) unit vectors towards the camera.
     """
@@ -409,7 +409,7 @@ def shaded(mesh: Mesh, normals: Floats, sight: Floats) -> NDArray[np.float64]:
     halfway = halfway / _length(halfway)[:, None]
     highlight = mesh.gloss * np.clip(np.einsum("fk,fk->f", normals, halfway), 0.0, 1.0) ** SHININESS
     light = AMBIENT + SKYLIGHT * up + DIFFUSE * lamp
-    return np.asarray(mesh.colours * light[:, None] + 255.0 * highlight[:, None])
+    return np.asarray(mesh.colors * light[:, None] + 255.0 * highlight[:, None])
 
 
 # A flat drawing surface: shapes at twice the size, text on top at its true size, so that both are smooth.
@@ -421,7 +421,7 @@ DESIGN_HEIGHT: Final = 720
 """Height of the picture in which lengths of the panel are given."""
 
 _FONTS: Final = {False: "DejaVuSans.ttf", True: "DejaVuSans-Bold.ttf"}
-_ANCHORS: Final = {"left": 0.0, "centre": 0.5, "right": 1.0}
+_ANCHORS: Final = {"left": 0.0, "center": 0.5, "right": 1.0}
 
 
 class Canvas:
@@ -449,20 +449,20 @@ class Canvas:
         return self.size[0] / self.unit
 
     def rectangle(
-        self, x: float, y: float, width: float, height: float, colour: Colour, radius: float = 0.0
+        self, x: float, y: float, width: float, height: float, color: Color, radius: float = 0.0
     ) -> None:
         """A filled rectangle with round corners."""
         s = self._scale
         box = (round(x * s), round(y * s), round(width * s), round(height * s))
-        self._pygame.draw.rect(self.surface, colour, box, border_radius=round(radius * s))
+        self._pygame.draw.rect(self.surface, color, box, border_radius=round(radius * s))
 
-    def circle(self, x: float, y: float, radius: float, colour: Colour, width: float = 0.0) -> None:
+    def circle(self, x: float, y: float, radius: float, color: Color, width: float = 0.0) -> None:
         """A circle; filled if it has no width."""
         s = self._scale
         thick = max(1, round(width * s)) if width else 0
-        self._pygame.draw.circle(self.surface, colour, (x * s, y * s), radius * s, thick)
+        self._pygame.draw.circle(self.surface, color, (x * s, y * s), radius * s, thick)
 
-    def line(self, a: Sequence[float], b: Sequence[float], colour: Colour, width: float) -> None:
+    def line(self, a: Sequence[float], b: Sequence[float], color: Color, width: float) -> None:
         """A straight line."""
         s = self._scale
         dx, dy = b[0] - a[0], b[1] - a[1]
@@ -470,17 +470,17 @@ class Canvas:
         nx, ny = -dy * half, dx * half
         corners = ((a, 1.0), (b, 1.0), (b, -1.0), (a, -1.0))
         self._pygame.draw.polygon(
-            self.surface, colour, [((p[0] + k * nx) * s, (p[1] + k * ny) * s) for p, k in corners]
+            self.surface, color, [((p[0] + k * nx) * s, (p[1] + k * ny) * s) for p, k in corners]
         )
 
-    def polyline(self, points: Floats, colour: Colour, width: float) -> None:
+    def polyline(self, points: Floats, color: Color, width: float) -> None:
         """A line through points (n, 2), drawn as one ribbon."""
         ribbon = ribbon_of(points * self._scale, width * self._scale)
-        self._pygame.draw.polygon(self.surface, colour, ribbon.tolist())
+        self._pygame.draw.polygon(self.surface, color, ribbon.tolist())
 
-    def polygon(self, points: Floats, colour: Colour) -> None:
+    def polygon(self, points: Floats, color: Color) -> None:
         """A filled polygon (n, 2)."""
-        self._pygame.draw.polygon(self.surface, colour, (points * self._scale).tolist())
+        self._pygame.draw.polygon(self.surface, color, (points * self._scale).tolist())
 
     def text(
         self,
@@ -488,7 +488,7 @@ class Canvas:
         y: float,
         words: str,
         size: float,
-        colour: Colour = TEXT,
+        color: Color = TEXT,
         anchor: str = "left",
         bold: bool = False,
     ) -> None:
@@ -499,11 +499,11 @@ class Canvas:
             y: Of its middle.
             words: What it says.
             size: Height of the type.
-            colour: Of the type.
-            anchor: "left", "centre" or "right": the end that lies at ``x``.
+            color: Of the type.
+            anchor: "left", "center" or "right": the end that lies at ``x``.
             bold: Heavy type.
         """
-        image = self._rendered(words, size, colour, bold)
+        image = self._rendered(words, size, color, bold)
         wide, high = image.get_size()
         corner = (x * self.unit - _ANCHORS[anchor] * wide, y * self.unit - 0.5 * high)
         self._texts.append((image, corner))
@@ -519,8 +519,8 @@ class Canvas:
         self._texts.clear()
         return picture
 
-    def _render(self, words: str, size: float, colour: Colour, bold: bool) -> Any:
-        return self._font(size, bold).render(words, True, colour)
+    def _render(self, words: str, size: float, color: Color, bold: bool) -> Any:
+        return self._font(size, bold).render(words, True, color)
 
     def _load_font(self, size: float, bold: bool) -> Any:
         return self._pygame.font.Font(_font_file(bold), max(6, round(size * self.unit)))

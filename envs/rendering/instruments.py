@@ -20,7 +20,7 @@ WINDOW: Final = 8.0
 
 
 class CueHistory:
-    """Cues wanted and felt, at the cab's reference point: [f_x, f_y, f_z, w_x, w_y, w_z], m/s^2 and rad/s.
+    """Reference and simulator cues at the cab: [f_x, f_y, f_z, w_x, w_y, w_z], m/s^2 and rad/s.
 
     Only the last :attr:`window` seconds are kept; J and the largest values are of the whole drive.
 
@@ -58,25 +58,25 @@ class CueHistory:
         self._count = 0
         self._cost_sum = 0.0
         self.peak = np.zeros(6)
-        """(6,) Largest magnitude of each cue, wanted or felt."""
+        """(6,) Largest magnitude of each cue, reference or simulated."""
 
     def __len__(self) -> int:
         return min(self._count, self._capacity)
 
-    def append(self, time: float, wanted: ArrayLike, felt: ArrayLike) -> None:
+    def append(self, time: float, reference: ArrayLike, simulated: ArrayLike) -> None:
         """Add a sample.
 
         Args:
             time: s, later than the last one.
-            wanted: (6,) what the car does.
-            felt: (6,) what the simulator does.
+            reference: (6,) what the car does.
+            simulated: (6,) what the simulator does.
 
         Raises:
             DataError: a shape is wrong, a value is not finite, or time does not increase.
         """
-        row = np.concatenate([[time], np.ravel(wanted), np.ravel(felt)]).astype(np.float64)
+        row = np.concatenate([[time], np.ravel(reference), np.ravel(simulated)]).astype(np.float64)
         if row.shape != (13,) or not np.isfinite(row).all():
-            raise DataError("wanted and felt must each be 6 finite numbers at a finite time")
+            raise DataError("reference and simulated must each be 6 finite numbers at a finite time")
         if self._count and time <= self.time:
             raise DataError(f"time must increase, found {time} after {self.time}; clear() begins a new drive")
         k = self._count % self._capacity
@@ -101,12 +101,12 @@ class CueHistory:
         return self._rows()[:, 0]
 
     @property
-    def wanted(self) -> Floats:
+    def reference_cue(self) -> Floats:
         """(m, 6) Cues of the car."""
         return self._rows()[:, 1:7]
 
     @property
-    def felt(self) -> Floats:
+    def simulator_cue(self) -> Floats:
         """(m, 6) Cues of the simulator."""
         return self._rows()[:, 7:]
 
@@ -117,7 +117,7 @@ class CueHistory:
         return rows
 
 
-# A chart of the last seconds of one cue: wanted in white, felt in colour, the gap between them shaded.
+# A chart of the last seconds of one cue: reference in white, simulated in color, the gap between them shaded.
 
 
 _LADDER: Final = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0)
@@ -188,19 +188,21 @@ def draw_chart(canvas: Canvas, place: Box, channel: Channel, cues: CueHistory) -
         share = values[rows, channel.axis] * channel.scale / limit
         return np.column_stack([x, plot.y + 0.5 * plot.height * (1.0 - np.clip(share, -1.0, 1.0))])
 
-    wanted, felt = curve(cues.wanted), curve(cues.felt)
-    canvas.polygon(np.concatenate([wanted, felt[::-1]]), theme.blend(theme.CARD, theme.FELT, 0.2))
-    canvas.polyline(wanted, theme.WANTED, 1.6)
-    canvas.polyline(felt, theme.FELT, 2.0)
-    canvas.circle(wanted[-1, 0], wanted[-1, 1], 2.4, theme.WANTED)
-    canvas.circle(felt[-1, 0], felt[-1, 1], 3.0, theme.FELT)
+    reference, simulated = curve(cues.reference_cue), curve(cues.simulator_cue)
+    canvas.polygon(
+        np.concatenate([reference, simulated[::-1]]), theme.blend(theme.CARD, theme.SIMULATOR, 0.2)
+    )
+    canvas.polyline(reference, theme.REFERENCE, 1.6)
+    canvas.polyline(simulated, theme.SIMULATOR, 2.0)
+    canvas.circle(reference[-1, 0], reference[-1, 1], 2.4, theme.REFERENCE)
+    canvas.circle(simulated[-1, 0], simulated[-1, 1], 3.0, theme.SIMULATOR)
 
 
 def _axes(canvas: Canvas, plot: Box, limit: float, begin: float, window: float) -> None:
     for share in (-1.0, 0.0, 1.0):
         y = plot.y + 0.5 * plot.height * (1.0 - share)
-        colour = theme.LINE if share else theme.blend(theme.LINE, theme.FAINT_TEXT, 0.35)
-        canvas.line((plot.x, y), (plot.x + plot.width, y), colour, 0.8)
+        color = theme.LINE if share else theme.blend(theme.LINE, theme.FAINT_TEXT, 0.35)
+        canvas.line((plot.x, y), (plot.x + plot.width, y), color, 0.8)
         label = f"{share * limit:+g}".replace("-", "−") if share else "0"
         canvas.text(plot.x - 6.0, y, label, 10.0, theme.FAINT_TEXT, "right")
     for tick in np.arange(np.ceil(begin / _TICK_SPACING) * _TICK_SPACING, begin + window, _TICK_SPACING):
@@ -232,7 +234,7 @@ def draw_gauges(canvas: Canvas, place: Box, platform: Platform, motion: MotionVi
     middle = place.y + 30.0 + 0.5 * square
     cells = [place.x + third * (k + 0.5) for k in range(3)]
     for x, label in zip(cells, ("Carriage", "Turntable", "Legs"), strict=True):
-        canvas.text(x, place.y + 15.0, label, 12.0, anchor="centre")
+        canvas.text(x, place.y + 15.0, label, 12.0, anchor="center")
     below = place.y + place.height - 13.0
     _carriage(canvas, cells[0], middle, square, below, platform, motion)
     _turntable(canvas, cells[1], middle, 0.5 * square, below, platform, motion)
@@ -253,24 +255,24 @@ def _carriage(
     """Travel in plan: ahead is up, right is right."""
     carriage = platform.carriage
     if carriage is None:
-        canvas.text(x, y, "none", _LABEL, theme.FAINT_TEXT, "centre")
+        canvas.text(x, y, "none", _LABEL, theme.FAINT_TEXT, "center")
         return
     low = np.array([carriage.travel_x[0], carriage.travel_y[0]])
     high = np.array([carriage.travel_x[1], carriage.travel_y[1]])
     scale = (square - 4.0) / float(max(*(high - low), 1e-9))
-    centre = 0.5 * (low + high)
+    center = 0.5 * (low + high)
     tall, wide = scale * (high - low)
     edge = Box(x - 0.5 * wide, y - 0.5 * tall, wide, tall)
     canvas.rectangle(edge.x - 2.0, edge.y - 2.0, wide + 4.0, tall + 4.0, theme.TRAVEL, 3.0)
     canvas.rectangle(edge.x - 1.0, edge.y - 1.0, wide + 2.0, tall + 2.0, theme.PANEL, 2.0)
     canvas.line((x, edge.y), (x, edge.y + tall), theme.LINE, 0.8)
     canvas.line((edge.x, y), (edge.x + wide, y), theme.LINE, 0.8)
-    ahead, right = scale * (motion.carriage - centre)
+    ahead, right = scale * (motion.carriage - center)
     limit = np.where(motion.carriage >= 0.0, high, low)
     use = float(np.max(np.divide(motion.carriage, limit, out=np.zeros(2), where=limit != 0.0)))
-    canvas.circle(x + right, y - ahead, 5.0, theme.colour_of_use(use))
+    canvas.circle(x + right, y - ahead, 5.0, theme.color_of_use(use))
     words = f"x {signed(motion.carriage[0], 1)}  y {signed(motion.carriage[1], 1)} m"
-    canvas.text(x, below, words, _LABEL, theme.FAINT_TEXT, "centre")
+    canvas.text(x, below, words, _LABEL, theme.FAINT_TEXT, "center")
 
 
 def _turntable(
@@ -285,14 +287,14 @@ def _turntable(
     """The heading in plan: ahead is up, positive to the right."""
     turntable = platform.turntable
     if turntable is None:
-        canvas.text(x, y, "none", _LABEL, theme.FAINT_TEXT, "centre")
+        canvas.text(x, y, "none", _LABEL, theme.FAINT_TEXT, "center")
         return
     canvas.circle(x, y, radius, theme.LINE)
     canvas.circle(x, y, radius - 1.4, theme.PANEL)
 
-    def ray(angle: float, inner: float, outer: float, colour: theme.Colour, width: float) -> None:
+    def ray(angle: float, inner: float, outer: float, color: theme.Color, width: float) -> None:
         s, c = np.sin(angle), -np.cos(angle)
-        canvas.line((x + inner * s, y + inner * c), (x + outer * s, y + outer * c), colour, width)
+        canvas.line((x + inner * s, y + inner * c), (x + outer * s, y + outer * c), color, width)
 
     for angle in np.arange(0.0, 2.0 * np.pi, np.pi / 6.0):
         ray(angle, radius - 6.0, radius - 2.0, theme.LINE, 1.0)
@@ -302,8 +304,8 @@ def _turntable(
     s, c = np.sin(motion.turntable), np.cos(motion.turntable)
     needle = radius * np.array([[0.0, -0.82], [0.17, 0.30], [0.0, 0.16], [-0.17, 0.30]])
     use = motion.turntable / (stops[1] if motion.turntable > 0.0 else stops[0])
-    canvas.polygon((x, y) + needle @ np.array([[c, s], [-s, c]]), theme.colour_of_use(use))
-    canvas.text(x, below, f"{signed(np.degrees(motion.turntable), 0)}°", _LABEL, theme.FAINT_TEXT, "centre")
+    canvas.polygon((x, y) + needle @ np.array([[c, s], [-s, c]]), theme.color_of_use(use))
+    canvas.text(x, below, f"{signed(np.degrees(motion.turntable), 0)}°", _LABEL, theme.FAINT_TEXT, "center")
 
 
 def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: MotionView) -> None:
@@ -316,9 +318,7 @@ def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: 
         x, wide = place.x + (i + 0.18) * pitch, 0.64 * pitch
         canvas.rectangle(x, place.y, wide, place.height, theme.PANEL, 2.0)
         length = max(1.5, min(abs(float(u)), 1.0) * half)
-        canvas.rectangle(
-            x, middle - (length if u > 0.0 else 0.0), wide, length, theme.colour_of_use(float(u))
-        )
+        canvas.rectangle(x, middle - (length if u > 0.0 else 0.0), wide, length, theme.color_of_use(float(u)))
     canvas.line((place.x, middle), (place.x + place.width, middle), theme.FAINT_TEXT, 0.8)
     most = motion.legs[int(np.argmax(np.abs(motion.legs)))]
     canvas.text(
@@ -327,7 +327,7 @@ def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: 
         f"{signed(most, 2)} m",
         _LABEL,
         theme.FAINT_TEXT,
-        "centre",
+        "center",
     )
 
 
@@ -373,8 +373,8 @@ def _header(canvas: Canvas, place: Box, cues: CueHistory) -> None:
         right - 2.0, place.y + 37.0, f"J so far  {cues.cue_error:.2f}", 13.0, anchor="right", bold=True
     )
     x = place.x + 2.0
-    for words, colour in (("wanted", theme.WANTED), ("felt", theme.FELT)):
-        canvas.line((x, place.y + 67.0), (x + 20.0, place.y + 67.0), colour, 2.6)
+    for words, color in (("car", theme.REFERENCE), ("simulator", theme.SIMULATOR)):
+        canvas.line((x, place.y + 67.0), (x + 20.0, place.y + 67.0), color, 2.6)
         canvas.text(x + 27.0, place.y + 67.0, words, 12.0)
         x += 27.0 + canvas.text_width(words, 12.0) + 22.0
     canvas.text(right - 2.0, place.y + 67.0, f"last {cues.window:.0f} s", 12.0, theme.FAINT_TEXT, "right")

@@ -75,7 +75,7 @@ class CabParts:
         furniture: From the front to the back: dashboard, steering wheel, driver on the seat, the seat's back.
         driver: (3,) the driver's head, m.
         shell: The body with its windows; None for an open cockpit.
-        wheels: Of the left and of the right side, tyres before rims; none for an open cockpit.
+        wheels: Of the left and of the right side, tires before rims; none for an open cockpit.
     """
 
     inside: tuple[Mesh, ...]
@@ -184,7 +184,7 @@ def _scale_marks(radius: float, deck: float) -> Mesh:
     height = np.full(len(corners), deck - _ABOVE)
     faces = np.arange(len(corners)).reshape(-1, 4)
     marks = mesh(np.column_stack([corners, height]), faces, theme.STEEL)
-    marks.colours[0] = theme.FELT
+    marks.colors[0] = theme.SIMULATOR
     return marks
 
 
@@ -231,7 +231,7 @@ def _cockpit(driver: Floats, deck: float) -> CabParts:
     )
 
 
-# The six legs: a barrel below, coloured by the use of the stroke, and a rod to the upper joint.
+# The six legs: a barrel below, colored by the use of the stroke, and a rod to the upper joint.
 
 
 _BARREL_SHARE: Final = 0.92
@@ -271,18 +271,18 @@ class Legs:
             use: (6,) share of the stroke in use, -1 to 1.
         """
         split = lower + (upper - lower) * (self.barrel / np.linalg.norm(upper - lower, axis=1))[:, None]
-        colours = np.array([theme.colour_of_use(float(u)) for u in use], dtype=np.float64)
+        colors = np.array([theme.color_of_use(float(u)) for u in use], dtype=np.float64)
         rods = np.tile(np.array(theme.ROD, dtype=np.float64), (len(use), 1))
         ball = sphere(self.scale * _BALL_RADIUS, theme.STEEL, sides=6, gloss=0.4)
         return joined(
-            tubes(lower, split, self.scale * _BARREL_RADIUS, colours, 0.25),
+            tubes(lower, split, self.scale * _BARREL_RADIUS, colors, 0.25),
             tubes(split, upper, self.scale * _ROD_RADIUS, rods, 0.6),
             *(ball.moved(joint) for joint in upper),
         )
 
 
-def tubes(start: Floats, end: Floats, radius: float, colours: Floats, gloss: float) -> Mesh:
-    """Open tubes from points (n, 3) to others, in colours (n, 3)."""
+def tubes(start: Floats, end: Floats, radius: float, colors: Floats, gloss: float) -> Mesh:
+    """Open tubes from points (n, 3) to others, in colors (n, 3)."""
     n, length = len(start), np.linalg.norm(end - start, axis=1)
     local = np.tile(_UNIT_TUBE * (radius, radius, 1.0), (n, 1, 1))
     local[..., 2] *= length[:, None]
@@ -292,7 +292,7 @@ def tubes(start: Floats, end: Floats, radius: float, colours: Floats, gloss: flo
     return Mesh(
         vertices.reshape(-1, 3),
         faces,
-        np.repeat(colours, each, axis=0),
+        np.repeat(colors, each, axis=0),
         np.full(n * each, gloss),
         np.ones(n * each),
     )

@@ -45,10 +45,11 @@ def motion_of(state: Any) -> MotionView:
 
 def append_state(history: CueHistory, time: float, state: Any) -> None:
     """Add the cues in one row of :attr:`..simulator.Simulator.state` to a history."""
-    wanted, felt = (
-        np.concatenate([state[name]["force"], state[name]["rate"]]) for name in ("wanted", "felt")
+    reference, simulated = (
+        np.concatenate([state[name]["force"], state[name]["rate"]])
+        for name in ("reference_cue", "simulator_cue")
     )
-    history.append(time, wanted, felt)
+    history.append(time, reference, simulated)
 
 
 # The machine in its hall, in three dimensions.
@@ -72,12 +73,12 @@ class Arrows:
     """Specific force at the driver's head, in the axes of car and cab, m/s^2.
 
     Args:
-        wanted: (3,) in the car.
-        felt: (3,) in the simulator.
+        reference_cue: (3,) in the car.
+        simulator_cue: (3,) in the simulator.
     """
 
-    wanted: Floats
-    felt: Floats
+    reference_cue: Floats
+    simulator_cue: Floats
 
 
 class Scene:
@@ -171,9 +172,12 @@ class Scene:
         """Specific force as arrows from the driver's head; one g is as long as an arm span."""
         frame = turntable_frame(self._platform, motion)
         start = head(self._platform, motion)
-        for force, colour in ((arrows.wanted, theme.WANTED), (arrows.felt, theme.FELT)):
+        for force, color in (
+            (arrows.reference_cue, theme.REFERENCE),
+            (arrows.simulator_cue, theme.SIMULATOR),
+        ):
             tip = start + frame.rotation @ force * (_ARROW_LENGTH / GRAVITY)
-            painter.arrow(start, tip, colour)
+            painter.arrow(start, tip, color)
 
 
 def placed(mesh: Mesh, frame: Frame) -> Mesh:
@@ -230,7 +234,7 @@ class Renderer:
             cues: What is wanted and felt; its last sample is drawn as arrows at the driver's head.
         """
         self._stage.blit(self._backdrop, (0, 0))
-        arrows = Arrows(cues.wanted[-1, :3], cues.felt[-1, :3]) if len(cues) else None
+        arrows = Arrows(cues.reference_cue[-1, :3], cues.simulator_cue[-1, :3]) if len(cues) else None
         self._scene.draw(self._stage, motion, arrows)
         draw_panel(self._canvas, self._platform, motion, cues)
         picture = self._canvas.finish()
@@ -275,7 +279,7 @@ def _backdrop(pygame: ModuleType, size: tuple[int, int]) -> Any:
     x = (np.arange(width)[:, None] / width - 0.5) / 0.62
     y = (np.arange(height)[None, :] / height - 0.68) / 0.52
     glow = np.exp(-(x**2 + y**2) * 1.6)[..., None]
-    colours = np.array(theme.BACKDROP) * (1.0 - glow) + np.array(theme.GLOW) * glow
+    colors = np.array(theme.BACKDROP) * (1.0 - glow) + np.array(theme.GLOW) * glow
     surface = pygame.Surface(size, depth=32)
-    pygame.surfarray.blit_array(surface, colours.round().astype(np.uint8))
+    pygame.surfarray.blit_array(surface, colors.round().astype(np.uint8))
     return surface

@@ -27,7 +27,7 @@ from .theme import (
     SKIN,
     TAIL_LIGHT,
     TYRE,
-    Colour,
+    Color,
 )
 
 
@@ -123,20 +123,20 @@ def _ring(section: Section) -> NDArray[np.float64]:
     return np.concatenate([right, (right * [1.0, -1.0, 1.0])[:0:-1]])
 
 
-def _paint(body: Mesh, chosen: NDArray[np.bool_], colour: Colour, gloss: float, opacity: float = 1.0) -> None:
+def _paint(body: Mesh, chosen: NDArray[np.bool_], color: Color, gloss: float, opacity: float = 1.0) -> None:
     faces = np.flatnonzero(chosen)
-    body.colours[faces], body.gloss[faces], body.opacity[faces] = colour, gloss, opacity
+    body.colors[faces], body.gloss[faces], body.opacity[faces] = color, gloss, opacity
 
 
 def wheels(side: float) -> tuple[Mesh, Mesh]:
-    """Tyres and rims of the left (-1) or the right (1) side."""
-    tyres: list[Mesh] = []
+    """Tires and rims of the left (-1) or the right (1) side."""
+    tires: list[Mesh] = []
     rims: list[Mesh] = []
     for x in _AXLES:
         inner, outer, cover = (np.array([x, side * y, -_WHEEL_RADIUS]) for y in (0.74, 0.86, 0.864))
-        tyres.append(cylinder(inner, outer, _WHEEL_RADIUS, TYRE, sides=24))
+        tires.append(cylinder(inner, outer, _WHEEL_RADIUS, TYRE, sides=24))
         rims.append(cylinder(outer, cover, 0.62 * _WHEEL_RADIUS, RIM, gloss=0.3, sides=20))
-    return joined(*tyres), joined(*rims)
+    return joined(*tires), joined(*rims)
 
 
 def dashboard(driver: NDArray[np.float64]) -> Mesh:
@@ -217,7 +217,7 @@ Floats = NDArray[np.float64]
 
 _GRID_SPACING: Final = 2.0
 _SEGMENT: Final = 3
-"""Squares a piece of a line passes; each piece has one colour."""
+"""Squares a piece of a line passes; each piece has one color."""
 _GRID_REACH: Final = 26.0
 """Beyond it everything has faded, m."""
 _DASH: Final = 0.8
@@ -281,7 +281,7 @@ def shadow(pygame: ModuleType, camera: Camera, size: tuple[int, int], scale: flo
         floor: z of the floor, m.
     """
     x, y = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5, indexing="ij")
-    sight = np.stack([x - camera.centre[0], y - camera.centre[1], np.full_like(x, camera.focal)], axis=-1)
+    sight = np.stack([x - camera.center[0], y - camera.center[1], np.full_like(x, camera.focal)], axis=-1)
     rays = sight @ camera.axes
     way = (floor - camera.position[2]) / np.maximum(rays[..., 2:], 1e-6)
     hit = camera.position + rays * way

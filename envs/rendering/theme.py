@@ -1,4 +1,4 @@
-"""Colours and light: a calm dark studio, in which what moves and what is felt stand out."""
+"""Colors and light: a calm dark studio, in which what moves and what is felt stand out."""
 
 from __future__ import annotations
 
@@ -6,42 +6,42 @@ from typing import Final
 
 import numpy as np
 
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
-BACKDROP: Final[Colour] = (17, 21, 28)
+BACKDROP: Final[Color] = (17, 21, 28)
 """Far away everything fades into it."""
-GLOW: Final[Colour] = (45, 54, 67)
+GLOW: Final[Color] = (45, 54, 67)
 """The floor in the middle of the light."""
-GRID: Final[Colour] = (58, 69, 85)
-TRAVEL: Final[Colour] = (205, 96, 80)
+GRID: Final[Color] = (58, 69, 85)
+TRAVEL: Final[Color] = (205, 96, 80)
 """Limits of the carriage's travel."""
 
-STEEL: Final[Colour] = (96, 108, 124)
-DARK_STEEL: Final[Colour] = (62, 71, 84)
-RAIL: Final[Colour] = (122, 135, 152)
-CARRIAGE: Final[Colour] = (78, 92, 110)
-PLATFORM: Final[Colour] = (92, 105, 123)
-TURNTABLE: Final[Colour] = (52, 60, 72)
-ROD: Final[Colour] = (214, 221, 229)
-BODY: Final[Colour] = (182, 189, 199)
-GLASS: Final[Colour] = (70, 104, 130)
-TYRE: Final[Colour] = (30, 33, 38)
-RIM: Final[Colour] = (150, 158, 168)
-INTERIOR: Final[Colour] = (38, 43, 51)
-SKIN: Final[Colour] = (232, 178, 140)
-SHIRT: Final[Colour] = (62, 118, 168)
-HEADLIGHT: Final[Colour] = (255, 246, 214)
-TAIL_LIGHT: Final[Colour] = (206, 52, 46)
+STEEL: Final[Color] = (96, 108, 124)
+DARK_STEEL: Final[Color] = (62, 71, 84)
+RAIL: Final[Color] = (122, 135, 152)
+CARRIAGE: Final[Color] = (78, 92, 110)
+PLATFORM: Final[Color] = (92, 105, 123)
+TURNTABLE: Final[Color] = (52, 60, 72)
+ROD: Final[Color] = (214, 221, 229)
+BODY: Final[Color] = (182, 189, 199)
+GLASS: Final[Color] = (70, 104, 130)
+TYRE: Final[Color] = (30, 33, 38)
+RIM: Final[Color] = (150, 158, 168)
+INTERIOR: Final[Color] = (38, 43, 51)
+SKIN: Final[Color] = (232, 178, 140)
+SHIRT: Final[Color] = (62, 118, 168)
+HEADLIGHT: Final[Color] = (255, 246, 214)
+TAIL_LIGHT: Final[Color] = (206, 52, 46)
 
-WANTED: Final[Colour] = (242, 244, 247)
-FELT: Final[Colour] = (86, 180, 233)
-"""Okabe and Ito's sky blue: told apart from white and from the colours of use by everyone."""
+REFERENCE: Final[Color] = (242, 244, 247)
+SIMULATOR: Final[Color] = (86, 180, 233)
+"""Okabe and Ito's sky blue: told apart from white and from the colors of use by everyone."""
 
-PANEL: Final[Colour] = (22, 27, 35)
-CARD: Final[Colour] = (29, 35, 45)
-LINE: Final[Colour] = (58, 68, 82)
-TEXT: Final[Colour] = (226, 231, 238)
-FAINT_TEXT: Final[Colour] = (142, 154, 170)
+PANEL: Final[Color] = (22, 27, 35)
+CARD: Final[Color] = (29, 35, 45)
+LINE: Final[Color] = (58, 68, 82)
+TEXT: Final[Color] = (226, 231, 238)
+FAINT_TEXT: Final[Color] = (142, 154, 170)
 
 _USE: Final = np.array([[64, 176, 160], [64, 176, 160], [240, 180, 60], [226, 72, 60]], dtype=np.float64)
 _USE_AT: Final = (0.0, 0.45, 0.8, 1.0)
@@ -56,14 +56,14 @@ SHININESS: Final = 28.0
 """Exponent of the highlight (Blinn and Phong)."""
 
 
-def colour_of_use(use: float) -> Colour:
-    """Colour of an actuator at a share of its travel: green at ease, amber from 0.8, red at the end."""
+def color_of_use(use: float) -> Color:
+    """Color of an actuator at a share of its travel: green at ease, amber from 0.8, red at the end."""
     at = min(abs(use), 1.0)
     r, g, b = (round(float(np.interp(at, _USE_AT, _USE[:, k]))) for k in range(3))
     return (r, g, b)
 
 
-def blend(a: Colour, b: Colour, weight: float) -> Colour:
+def blend(a: Color, b: Color, weight: float) -> Color:
     """``a`` with a share ``weight`` of ``b``."""
     r, g, h = (round((1.0 - weight) * p + weight * q) for p, q in zip(a, b, strict=True))
     return (r, g, h)

@@ -123,7 +123,7 @@ def rules_of(
     rules: Any = Rules()
     rules.action = _actions(platforms, options.action, device)
     rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
-    rules.places = places_of(layout, options.observation, dt, options.randomisation)
+    rules.places = places_of(layout, options.observation, dt, options.randomization)
     if options.observation.machine:
         abilities = np.array([ability_of(platform) for platform in platforms])
         rules.places.abilities = wp.array(abilities, dtype=wp.float32, device=device)
@@ -236,7 +236,7 @@ class Batch:
 
     def _library(self, drives: Sequence[CueTrace] | None) -> list[CueTrace]:
         if drives is None:
-            drives = library_of(self.options.episode, self.options.randomisation)
+            drives = library_of(self.options.episode, self.options.randomization)
         return [drive.resampled(TIME_STEP) for drive in drives]
 
     def seed(self, mask: Mask, seeds: Sequence[int]) -> None:
@@ -273,7 +273,7 @@ class Batch:
         machine_of = self._chosen(words[:, MACHINE_STREAM], len(self.scales), machine, mask)
         options = self.options
         first, last = start_samples(words, self._lengths[drive_of], options.episode, TIME_STEP)
-        fill_episodes(self.arrays.episode.view, mask, words, last, options.randomisation)
+        fill_episodes(self.arrays.episode.view, mask, words, last, options.randomization)
         self.arrays.episode.push()
         self._place(
             mask,

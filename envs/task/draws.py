@@ -1,7 +1,7 @@
 """Random numbers that depend only on an environment's seed and its episode: the same alone or in a batch.
 
-A counter goes through the finaliser of SplitMix64 (Steele, Lea and Flood 2014), so a whole batch is
-drawn at once, and an environment's numbers do not depend on its neighbours.
+A counter goes through the finalizer of SplitMix64 (Steele, Lea and Flood 2014), so a whole batch is
+drawn at once, and an environment's numbers do not depend on its neighbors.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _SHIFTS: Final = (np.uint64(30), np.uint64(27), np.uint64(31))
 
 
 def key_of(seed: int) -> int:
-    """The 64-bit key of a seed: neighbouring seeds have unlike keys."""
+    """The 64-bit key of a seed: neighboring seeds have unlike keys."""
     return int(np.random.SeedSequence(seed).generate_state(1, np.uint64)[0])
 
 
 def mixed(words: Words) -> Words:
-    """SplitMix64's finaliser: every bit of a word changes half the bits of the result."""
+    """SplitMix64's finalizer: every bit of a word changes half the bits of the result."""
     words = (words ^ (words >> _SHIFTS[0])) * _MIX[0]
     words = (words ^ (words >> _SHIFTS[1])) * _MIX[1]
     return words ^ (words >> _SHIFTS[2])

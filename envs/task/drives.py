@@ -17,8 +17,8 @@ from ..maneuvers.maneuver import LARGEST_OFFSET
 from ..platform.kernels.step import ActuatorDynamics
 from ..platform.machines import Platform
 from ..platform.presets import get_platform
-from ..platform.randomization import drawn_machine
-from .options import EpisodeOptions, RandomisationOptions, TaskOptions
+from ..platform.randomization import random_platform
+from .options import EpisodeOptions, RandomizationOptions, TaskOptions
 
 _FRICTION_STREAM: Final = 1
 _MACHINE_STREAM: Final = 2
@@ -36,16 +36,16 @@ def slippery(car: Car, factor: float) -> Car:
     return replace(car, tires=replace(car.tires, friction=factor * car.tires.friction))
 
 
-def _frictions(episode: EpisodeOptions, randomisation: RandomisationOptions, count: int) -> list[float]:
+def _frictions(episode: EpisodeOptions, randomization: RandomizationOptions, count: int) -> list[float]:
     rng = np.random.default_rng((episode.library_seed, _FRICTION_STREAM))
-    return [float(value) for value in rng.uniform(*randomisation.friction, count)]
+    return [float(value) for value in rng.uniform(*randomization.friction, count)]
 
 
-def _random_drives(episode: EpisodeOptions, randomisation: RandomisationOptions) -> list[CueTrace]:
+def _random_drives(episode: EpisodeOptions, randomization: RandomizationOptions) -> list[CueTrace]:
     """The library; drives whose car comes off its path are drawn anew, if they are few."""
     count = episode.library
     seeds = drive_seeds(_DRAWS * count, episode.library_seed)
-    frictions = _frictions(episode, randomisation, count)
+    frictions = _frictions(episode, randomization, count)
     drives: dict[int, CueTrace] = {}
     rows = list(range(count))
     for draw in range(_DRAWS):
@@ -68,9 +68,9 @@ def _slippery_plan(episode: EpisodeOptions, seed: int, friction: float) -> Plan:
     return episode.random.plan(seed, episode.drive_duration, car=slippery(car, friction))
 
 
-def _named_drives(episode: EpisodeOptions, randomisation: RandomisationOptions) -> list[CueTrace]:
+def _named_drives(episode: EpisodeOptions, randomization: RandomizationOptions) -> list[CueTrace]:
     """Each recording once, and each maneuver by each car."""
-    frictions = iter(_frictions(episode, randomisation, len(episode.drives) * len(episode.random.cars)))
+    frictions = iter(_frictions(episode, randomization, len(episode.drives) * len(episode.random.cars)))
     plans, recordings = [], []
     for name in episode.drives:
         if name in recording_names():
@@ -107,13 +107,13 @@ def _off_its_path(plan: Plan, trace: CueTrace) -> ConfigurationError:
     car = plan.car
     return ConfigurationError(
         f"{car.name} with tire friction {car.tires.friction:.2f} came {_offset(trace):.1f} m off the path of "
-        f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomisation.friction, or leave the "
+        f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomization.friction, or leave the "
         "drive or the car out of episode"
     )
 
 
 @lru_cache(maxsize=8)
-def library_of(episode: EpisodeOptions, randomisation: RandomisationOptions) -> tuple[CueTrace, ...]:
+def library_of(episode: EpisodeOptions, randomization: RandomizationOptions) -> tuple[CueTrace, ...]:
     """The drives that options ask for; the same options give the same drives.
 
     Raises:
@@ -122,7 +122,7 @@ def library_of(episode: EpisodeOptions, randomisation: RandomisationOptions) -> 
         DataError: a car left the range of its model.
     """
     make = _named_drives if episode.drives else _random_drives
-    return tuple(make(episode, randomisation))
+    return tuple(make(episode, randomization))
 
 
 def platform_of(options: TaskOptions) -> Platform:
@@ -136,19 +136,19 @@ def machines_of(options: TaskOptions) -> list[Platform]:
     Raises:
         ConfigurationError: no machine of the builds asked for closes.
     """
-    platform, ranges, seed = platform_of(options), options.randomisation, options.episode.library_seed
+    platform, ranges, seed = platform_of(options), options.randomization, options.episode.library_seed
     if ranges.natural_frequency is None and ranges.dead_time is None and ranges.build is None:
         return [platform]
     machines = [platform] * ranges.machines
     if ranges.build is not None:
         rng = np.random.default_rng((seed, _BUILD_STREAM))
         names = [f"{platform.name}-{k}" for k in range(ranges.machines)]
-        machines = [drawn_machine(platform, ranges.build, rng, name) for name in names]
+        machines = [random_platform(platform, ranges.build, rng, name) for name in names]
     rng = np.random.default_rng((seed, _MACHINE_STREAM))
     return [_variant(machine, ranges, rng) for machine in machines]
 
 
-def _variant(platform: Platform, ranges: RandomisationOptions, rng: np.random.Generator) -> Platform:
+def _variant(platform: Platform, ranges: RandomizationOptions, rng: np.random.Generator) -> Platform:
     def drawn(own: ActuatorDynamics) -> ActuatorDynamics:
         if ranges.natural_frequency is not None:
             own = replace(own, natural_frequency=float(rng.uniform(*ranges.natural_frequency)))

@@ -139,7 +139,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
 
     def action_of(self, acceleration: ArrayLike) -> Action:
         """Actions of the mode "acceleration" for accelerations (..., 9); 0 on axes that cannot move."""
-        return normalised(acceleration, self.scale)
+        return normalized(acceleration, self.scale)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -208,7 +208,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
             self._pictures.close()
 
 
-def normalised(acceleration: ArrayLike, scale: NDArray[np.float64]) -> Action:
+def normalized(acceleration: ArrayLike, scale: NDArray[np.float64]) -> Action:
     """Actions (..., 9) for accelerations in SI units and their scale (9,) or (n, 9); 0 where it is 0.
 
     Raises:

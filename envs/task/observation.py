@@ -25,10 +25,10 @@ DIFFERENCE: Final = (
 """Rows after :data:`~motion_cueing.envs.simulator.kernels.observation.ROWS`."""
 
 PERCEIVED: Final = (
-    Row("sensed_wanted_force", 3, 10.0, "m/s^2", "specific force sensed in the car"),
-    Row("sensed_wanted_rate", 3, 1.0, "rad/s", "angular velocity sensed in the car"),
-    Row("sensed_felt_force", 3, 10.0, "m/s^2", "specific force sensed in the cab"),
-    Row("sensed_felt_rate", 3, 1.0, "rad/s", "angular velocity sensed in the cab"),
+    Row("perceived_reference_force", 3, 10.0, "m/s^2", "specific force sensed in the car"),
+    Row("perceived_reference_rate", 3, 1.0, "rad/s", "angular velocity sensed in the car"),
+    Row("perceived_simulator_force", 3, 10.0, "m/s^2", "specific force sensed in the cab"),
+    Row("perceived_simulator_rate", 3, 1.0, "rad/s", "angular velocity sensed in the cab"),
 )
 """Rows of ``perceived``; forces with gravity at rest taken off z."""
 
@@ -77,7 +77,7 @@ def last_action_row(size: int) -> Row:
 
 
 def preview_row(samples: int) -> Row:
-    """The row of a preview: six cues a sample, each in the scale of ``wanted_force`` and ``wanted_rate``."""
+    """The row of a preview: six cues a sample, scaled as ``reference_force`` and ``reference_rate``."""
     return Row("preview", 6 * samples, 1.0, "10 m/s^2, rad/s", "car's cues ahead, nearest first")
 
 
@@ -193,7 +193,7 @@ def free_axes(frozen: tuple[str, ...]) -> Floats:
 def low_passed(drives: Sequence[CueTrace], time_constants: Sequence[float], dt: float) -> NDArray[np.float32]:
     """(samples of all drives, 6 per time constant) cues through 1 / (T s + 1), scaled as the observation's.
 
-    Held inputs, discretised exactly: y[k] = p y[k-1] + (1 - p) u[k] with p = exp(-dt / T). Before a drive the
+    Held inputs, discretized exactly: y[k] = p y[k-1] + (1 - p) u[k] with p = exp(-dt / T). Before a drive the
     car is taken to have moved as at its first sample.
     """
     return np.concatenate([_of_drive(drive, time_constants, dt) for drive in drives]).astype(np.float32)
@@ -201,7 +201,7 @@ def low_passed(drives: Sequence[CueTrace], time_constants: Sequence[float], dt: 
 
 def _of_drive(drive: CueTrace, time_constants: Sequence[float], dt: float) -> NDArray[np.float64]:
     lifted = drive.specific_force + np.array([0.0, 0.0, GRAVITY])
-    cues = np.hstack([lifted / SCALES["wanted_force"], drive.angular_velocity / SCALES["wanted_rate"]])
+    cues = np.hstack([lifted / SCALES["reference_force"], drive.angular_velocity / SCALES["reference_rate"]])
     columns = [np.zeros((len(cues), 0))]
     for time_constant in time_constants:
         p = np.exp(-dt / time_constant)

@@ -14,8 +14,8 @@ from ..perception.models import vestibular_model_names
 from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, platform_names
-from ..platform.randomization import BuildRanges
-from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
+from ..platform.randomization import PlatformRanges
+from ..settings import NonNegative, Positive, Vector2, Vector3, configuration, renamed
 from ..simulator.kernels.step import CueCost
 
 Count = Annotated[int, Field(ge=0)]
@@ -23,7 +23,7 @@ PositiveCount = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
 Frame = Literal["machine", "cab"]
-Felt = Literal["machine", "model"]
+SimulatorCueSource = Literal["machine", "model"]
 
 
 def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
@@ -55,7 +55,7 @@ class ObservationOptions:
             is ahead of the driver looks the same wherever the turntable stands.
         machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
             A policy that is told this runs on any machine.
-        felt: Which cues the cab's rows tell: "machine": those of the true motion, by its sensors; or "model":
+        simulator_cue: Source of the rows of simulator cues. "machine": true motion, by its sensors. "model":
             those of the set-points, which a controller works out by itself. A policy that sees the second
             has no loop through the actuators, so their lag and dead time cannot make it swing.
     """
@@ -68,7 +68,7 @@ class ObservationOptions:
     memory: tuple[Positive, ...] = ()
     frame: Frame = "machine"
     machine: bool = False
-    felt: Felt = "machine"
+    simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
 
 
 @configuration
@@ -157,7 +157,7 @@ class EpisodeOptions:
         drives: Maneuvers and recordings by name, one drawn for each episode; none for random drives.
         random: The random drives, and the cars that drive them and the maneuvers.
         library: Random drives to draw from. They are made when the environment is.
-        library_seed: Of the random drives, and of the machines and cars of the randomisation.
+        library_seed: Of the random drives, and of the machines and cars of the randomization.
         drive_duration: Of a random drive, s.
         duration: Longest episode, s; None for the whole drive.
         random_start: Whether an episode begins anywhere in its drive that leaves ``duration`` to go.
@@ -182,7 +182,7 @@ class EpisodeOptions:
 
 
 @configuration
-class RandomisationOptions:
+class RandomizationOptions:
     """What differs from episode to episode; nothing by default. Cars are ``episode.random.cars``.
 
     Args:
@@ -200,7 +200,7 @@ class RandomisationOptions:
     friction: tuple[Positive, Positive] = (1.0, 1.0)
     natural_frequency: tuple[Positive, Positive] | None = None
     dead_time: tuple[NonNegative, NonNegative] | None = None
-    build: BuildRanges | None = None
+    build: PlatformRanges | None = None
     machines: PositiveCount = 16
     actuator_gain: Share = 0.0
     sensor_gain: Share = 0.0
@@ -224,7 +224,7 @@ class TaskOptions:
         action: What can be done.
         reward: What is good.
         episode: What is driven.
-        randomisation: What differs from episode to episode.
+        randomization: What differs from episode to episode.
     """
 
     platform: Platform | str = "paper"
@@ -233,7 +233,9 @@ class TaskOptions:
     action: ActionOptions = ActionOptions()
     reward: RewardOptions = RewardOptions()
     episode: EpisodeOptions = EpisodeOptions()
-    randomisation: RandomisationOptions = RandomisationOptions()
+    randomization: Annotated[RandomizationOptions, renamed("randomization", "randomisation")] = (
+        RandomizationOptions()
+    )
 
     def __post_init__(self) -> None:
         if isinstance(self.platform, str):

@@ -18,7 +18,7 @@ from .environment import (
     RENDER_MODES,
     action_space,
     frames_per_second,
-    normalised,
+    normalized,
     observation_space,
     pictures_of,
     rendered,
@@ -99,7 +99,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
 
     def action_of(self, acceleration: ArrayLike) -> NDArray[np.float32]:
         """Actions of the mode "acceleration" for accelerations (..., 9); 0 on axes that cannot move."""
-        return normalised(acceleration, self.batch.scale)
+        return normalized(acceleration, self.batch.scale)
 
     def reset(
         self,

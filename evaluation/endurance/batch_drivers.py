@@ -138,7 +138,7 @@ class TaskBatch:
         vestibular: str,
     ) -> None:
         task = deterministic(policy.task, get_vestibular_model(vestibular))
-        task = replace(task, randomisation=endurance.randomisation(condition))
+        task = replace(task, randomization=endurance.randomization(condition))
         n = len(cues)
         self._batch = Batch(n, task, drives=cues, base=getattr(policy, "base_policy", None))
         self.simulator = self._batch.simulator

@@ -183,7 +183,10 @@ class TrueLimits:
 _ROWS: Final = 8192
 """Time steps of drives that are looked at together: some ten megabytes."""
 
-_CHANNELS: Final = (("wanted", "felt", "cue_error"), ("sensed_wanted", "sensed_felt", "perceived_cue_error"))
+_CHANNELS: Final = (
+    ("reference_cue", "simulator_cue", "cue_error"),
+    ("perceived_reference", "perceived_simulator", "perceived_cue_error"),
+)
 
 
 class Watch:
@@ -226,13 +229,13 @@ class Watch:
         for kind, flags in found.items():
             self.exceeded[kind] += flags.sum(axis=0)
         self.beyond += np.any(list(found.values()), axis=0).sum(axis=0)
-        for wanted, felt, name in _CHANNELS:
-            self.errors[name] += self._errors(rows[wanted], rows[felt])
+        for reference, simulated, name in _CHANNELS:
+            self.errors[name] += self._errors(rows[reference], rows[simulated])
 
-    def _errors(self, wanted: NDArray[Any], felt: NDArray[Any]) -> Floats:
+    def _errors(self, reference: NDArray[Any], simulated: NDArray[Any]) -> Floats:
         """(n,) sums over the block."""
-        error = cue_error(_cues(wanted), _cues(felt), self._criteria)
-        return np.asarray(error.reshape(wanted.shape).sum(axis=0))
+        error = cue_error(_cues(reference), _cues(simulated), self._criteria)
+        return np.asarray(error.reshape(reference.shape).sum(axis=0))
 
 
 def _cues(side: NDArray[Any]) -> Floats:

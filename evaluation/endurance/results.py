@@ -19,7 +19,7 @@ from ...envs.platform import Platform
 from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.storage import write_text
-from ...envs.task import RandomisationOptions, TaskOptions
+from ...envs.task import RandomizationOptions, TaskOptions
 from ...envs.task.drives import machines_of
 from ..provenance import package_version
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
@@ -61,13 +61,13 @@ class Endurance:
 
     def __post_init__(self) -> None:
         # The ranges are those of an environment, which says what is wrong with them.
-        assert self.randomisation(SLOWER).machines == self.machines
+        assert self.randomization(SLOWER).machines == self.machines
 
-    def randomisation(self, condition: str) -> RandomisationOptions:
+    def randomization(self, condition: str) -> RandomizationOptions:
         """What an environment draws under a condition."""
         if condition == NOMINAL:
-            return RandomisationOptions()
-        return RandomisationOptions(
+            return RandomizationOptions()
+        return RandomizationOptions(
             friction=self.friction,
             natural_frequency=self.natural_frequency,
             dead_time=self.dead_time,
@@ -76,7 +76,7 @@ class Endurance:
 
     def machines_under(self, condition: str, platform: Platform) -> list[Platform]:
         """The machines of a condition: the platform, or the slower ones, the same for every batch."""
-        return machines_of(TaskOptions(platform=platform, randomisation=self.randomisation(condition)))
+        return machines_of(TaskOptions(platform=platform, randomization=self.randomization(condition)))
 
 
 # What a policy withstood, drive by drive and in all; as JSON and CSV.
@@ -257,7 +257,7 @@ class EnduranceResults(Headed):
                     yield {"policy": policy, **about, "condition": condition, **_flat(endured)}
 
 
-def summarised(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSummary:
+def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSummary:
     """Drives in one; at least one.
 
     Args:
@@ -429,7 +429,7 @@ def _errors(results: EnduranceResults) -> TextTable:
 
 def _kinds(results: EnduranceResults) -> TextTable:
     rows = [
-        (name, kind, f"{len(drives)}", *_error_cells(summarised(drives, TIME_STEP)))
+        (name, kind, f"{len(drives)}", *_error_cells(summarized(drives, TIME_STEP)))
         for name in results.summaries
         for kind, drives in by_kind(results.policies[name].drives).items()
     ]

@@ -34,7 +34,7 @@ from .results import (
 
 _MACHINE_STREAM: Final = 2
 _FRICTION_STREAM: Final = 3
-"""Beside the seed of a drive; 1 is the road's unevenness."""
+"""Beside the seed of a drive; 1 is the road's roughness."""
 
 
 @dataclass(frozen=True, eq=False)

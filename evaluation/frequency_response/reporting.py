@@ -37,12 +37,15 @@ def response_table(response: FrequencyResponse) -> TextTable:
     pairs = [(axis, axis) for axis in response.inputs]
     pairs += [pair for pair in CROSSED if pair[0] in response.inputs]
     rows: list[tuple[str, ...]] = []
-    for moved, felt in pairs:
-        values = response.response(moved, felt)
-        name = moved if moved == felt else f"{moved} to {felt}"
-        modulus = np.abs(values) * factor(moved, felt)
+    for moved, simulated in pairs:
+        values = response.response(moved, simulated)
+        name = moved if moved == simulated else f"{moved} to {simulated}"
+        modulus = np.abs(values) * factor(moved, simulated)
         rows.append(
-            (f"{name}, modulus{unit(moved, felt)}", *(number(value) if value else "0" for value in modulus))
+            (
+                f"{name}, modulus{unit(moved, simulated)}",
+                *(number(value) if value else "0" for value in modulus),
+            )
         )
         phases = (f"{round(np.degrees(np.angle(value)))}" if value else NOTHING for value in values)
         rows.append((f"{name}, phase deg", *phases))
@@ -56,32 +59,32 @@ def amplitudes(scale: float) -> str:
     return "the test's amplitudes" if scale == 1.0 else f"{scale:g} of the test's amplitudes"
 
 
-def factor(moved: str, felt: str) -> float:
+def factor(moved: str, simulated: str) -> float:
     """From SI units to those a person reads: degrees."""
-    if moved[0] == felt[0]:
+    if moved[0] == simulated[0]:
         return 1.0
-    return float(np.degrees(1.0) if felt.startswith("w") else np.radians(1.0))
+    return float(np.degrees(1.0) if simulated.startswith("w") else np.radians(1.0))
 
 
-def unit(moved: str, felt: str) -> str:
+def unit(moved: str, simulated: str) -> str:
     """Of the modulus, in brackets, where it has one."""
-    if moved[0] == felt[0]:
+    if moved[0] == simulated[0]:
         return ""
-    return " (deg/s)/(m/s²)" if felt.startswith("w") else " (m/s²)/(deg/s)"
+    return " (deg/s)/(m/s²)" if simulated.startswith("w") else " (m/s²)/(deg/s)"
 
 
 def _flat(response: FrequencyResponse) -> Iterator[Mapping[str, Any]]:
     for sinusoid in response.sinusoids:
-        for felt, modulus in sinusoid.modulus.items():
+        for simulated, modulus in sinusoid.modulus.items():
             yield {
                 "policy": response.policy,
                 "input": sinusoid.input,
-                "felt": felt,
+                "simulator_cue": simulated,
                 "frequency_rad_s": sinusoid.frequency,
                 "amplitude": sinusoid.amplitude,
                 "modulus": modulus,
-                "phase_rad": sinusoid.phase[felt],
-                "explained": sinusoid.explained if felt == sinusoid.input else None,
+                "phase_rad": sinusoid.phase[simulated],
+                "explained": sinusoid.explained if simulated == sinusoid.input else None,
                 "at_limit": sinusoid.at_limit,
             }
 
@@ -162,8 +165,8 @@ def bode_figure(responses: Sequence[FrequencyResponse]) -> bytes:
             axes.set_xlabel("frequency (rad/s)")
         for k in range(4):
             grid[k, 0].set_ylabel("phase (deg)" if k % 2 else "modulus")
-        felt = {r.policy for r in responses for axis in r.inputs if np.any(r.response(axis, axis))}
-        _finish(figure, responses, "Frequency response, each axis to itself", felt)
+        simulated = {r.policy for r in responses for axis in r.inputs if np.any(r.response(axis, axis))}
+        _finish(figure, responses, "Frequency response, each axis to itself", simulated)
         return png(figure)
 
 
@@ -179,11 +182,11 @@ def matrix_figure(responses: Sequence[FrequencyResponse], criteria: Criteria | N
         grid = figure.subplots(len(CUE_AXES), len(inputs), sharex=True, sharey=True, squeeze=False)
         styles = _styles(responses)
         for j, moved in enumerate(inputs):
-            for i, felt in enumerate(CUE_AXES):
-                _modulus(grid[i, j], responses, styles, moved, felt, scales[moved] / scales[felt])
-                if felt == moved:
+            for i, simulated in enumerate(CUE_AXES):
+                _modulus(grid[i, j], responses, styles, moved, simulated, scales[moved] / scales[simulated])
+                if simulated == moved:
                     grid[i, j].set_facecolor("#f3f6f9")
-                grid[i, 0].set_ylabel(f"felt {felt}")
+                grid[i, 0].set_ylabel(f"simulator {simulated}")
             grid[0, j].set_title(f"car's {moved}")
             grid[-1, j].set_xlabel("rad/s")
         felt_at_all = {
@@ -208,7 +211,11 @@ def _styles(responses: Sequence[FrequencyResponse]) -> Styles:
 
 
 def _finish(
-    figure: Any, responses: Sequence[FrequencyResponse], title: str, felt: Collection[str], more: str = ""
+    figure: Any,
+    responses: Sequence[FrequencyResponse],
+    title: str,
+    simulated: Collection[str],
+    more: str = "",
 ) -> None:
     """Title and legend.
 
@@ -216,15 +223,17 @@ def _finish(
         figure: With the panels.
         responses: That are drawn.
         title: Of the figure.
-        felt: Policies that have a line somewhere; of the others the legend says why they have none.
+        simulated: Policies that have a line somewhere; of the others the legend says why they have none.
         more: Second line of the title.
     """
     about = f"motion base {responses[0].platform}, {amplitudes(responses[0].test.scale)}"
     figure.suptitle(f"{title} ({about})\n{more}".strip(), fontsize=11, x=0.01, ha="left")
     styles = _styles(responses)
     nothing = {"linestyle": ""}
-    handles = [Line2D([], [], **(style if policy in felt else nothing)) for policy, style in styles.items()]
-    labels = [policy if policy in felt else f"{policy}: nothing comes through" for policy in styles]
+    handles = [
+        Line2D([], [], **(style if policy in simulated else nothing)) for policy, style in styles.items()
+    ]
+    labels = [policy if policy in simulated else f"{policy}: nothing comes through" for policy in styles]
     columns = max(1, min(len(labels), int(figure.get_figwidth() / 2)))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
 
@@ -234,13 +243,13 @@ def _modulus(
     responses: Sequence[FrequencyResponse],
     styles: Styles,
     moved: str,
-    felt: str,
+    simulated: str,
     scale: float,
 ) -> None:
-    if moved == felt:
+    if moved == simulated:
         axes.axhline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     for response in responses:
-        modulus = scale * np.abs(response.response(moved, felt))
+        modulus = scale * np.abs(response.response(moved, simulated))
         # Lines that leave the panel are seen to; where nothing comes through there is no line.
         values = np.where(modulus > 0.0, np.maximum(modulus, 0.5 * _LEAST), np.nan)
         line = {"marker": "o", "markersize": 2.5, **styles[response.policy]}
@@ -268,10 +277,10 @@ def _phase(axes: Axes, responses: Sequence[FrequencyResponse], styles: Styles, a
     for response in responses:
         values = response.response(axis, axis)
         # Where nothing is felt the phase is that of rounding.
-        felt = np.abs(values) > _LEAST
-        phase = np.degrees(np.unwrap(np.angle(values[felt])))
+        simulated = np.abs(values) > _LEAST
+        phase = np.degrees(np.unwrap(np.angle(values[simulated])))
         line = {"marker": "o", "markersize": 2.5, **styles[response.policy]}
-        axes.plot(response.frequencies(axis)[felt], phase, **line)
+        axes.plot(response.frequencies(axis)[simulated], phase, **line)
     _frequencies(axes)
     axes.set_ylim(-280.0, 200.0)
     axes.set_yticks(range(-270, 181, 90))

@@ -237,9 +237,9 @@ class FrequencyResponse:
         """(n,) rad/s, of the sinusoids on an input axis."""
         return np.array([s.frequency for s in self.sinusoids if s.input == moved])
 
-    def response(self, moved: str, felt: str) -> Complexes:
+    def response(self, moved: str, simulated: str) -> Complexes:
         """(n,) complex response of an axis to an input axis, by :meth:`frequencies`; 0 in silence."""
-        chosen = [(s.modulus[felt], s.phase[felt]) for s in self.sinusoids if s.input == moved]
+        chosen = [(s.modulus[simulated], s.phase[simulated]) for s in self.sinusoids if s.input == moved]
         found = [0.0 if phase is None else modulus * np.exp(1j * phase) for modulus, phase in chosen]
         return np.array(found, dtype=np.complex128)
 
@@ -276,17 +276,17 @@ def frequency_response(
 class _Motion:
     """Wanted and felt motion (n, 6) of the window, and whether any actuator was at a limit (n,)."""
 
-    wanted: Floats
-    felt: Floats
+    reference: Floats
+    simulated: Floats
     limited: NDArray[np.bool_]
     dt: float
 
 
 def _sinusoid(one: Probe, motion: _Motion, amplitude: float) -> Sinusoid:
     column = CUE_AXES.index(one.axis)
-    wanted, _ = harmonic(motion.wanted, one.frequency, motion.dt)
-    felt, explained = harmonic(motion.felt, one.frequency, motion.dt)
-    ratio = felt / wanted[column]
+    reference, _ = harmonic(motion.reference, one.frequency, motion.dt)
+    simulated, explained = harmonic(motion.simulated, one.frequency, motion.dt)
+    ratio = simulated / reference[column]
     modulus, phase = np.abs(ratio), np.angle(ratio).tolist()
     phases = [angle if size >= SILENCE else None for size, angle in zip(modulus, phase, strict=True)]
     return Sinusoid(
@@ -311,10 +311,10 @@ def _motions(policy: AnyPolicy, platform: Platform, probes: Sequence[Probe]) -> 
 
 def _single(policy: AnyPolicy, platform: Platform, one: Probe) -> _Motion:
     drive = rollout(policy, one.cues, platform)
-    wanted, felt = cab_motion(drive)
+    reference, simulated = cab_motion(drive)
     window = slice(-one.samples, None)
     limited = np.any(drive.limits_active != 0, axis=1)
-    return _Motion(wanted[window], felt[window], limited[window], drive.dt)
+    return _Motion(reference[window], simulated[window], limited[window], drive.dt)
 
 
 def _batch(policy: Policy, platform: Platform, probes: Sequence[Probe]) -> Iterator[_Motion]:
@@ -332,7 +332,7 @@ def _batch(policy: Policy, platform: Platform, probes: Sequence[Probe]) -> Itera
         begins = np.zeros(len(probes), dtype=bool)
         row = k - (steps - samples)
         if row >= 0:
-            for i, cue in enumerate(("wanted", "felt")):
+            for i, cue in enumerate(("reference_cue", "simulator_cue")):
                 motion[i, row] = np.hstack([state[cue]["force"], state[cue]["rate"]])
             limited[row] = state["limits"] != 0
     for j in range(len(probes)):

@@ -72,7 +72,11 @@ def _lateral_force(drives: Drives) -> Figure:
     axes = figure.subplots()
     first = drives["EST1"]
     _curves(
-        axes, first.time, first.f_wanted[:, 1], {n: drives[n].f_felt[:, 1] for n in _TURNS}, "$f_y$, m/s²"
+        axes,
+        first.time,
+        first.f_reference[:, 1],
+        {n: drives[n].f_simulator[:, 1] for n in _TURNS},
+        "$f_y$, m/s²",
     )
     _in_g(axes)
     return figure
@@ -101,12 +105,12 @@ def _yaw_rate(drives: Drives) -> Figure:
     figure = new_figure(8.0, 5.6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.5, 1.0))
     first, second = drives["EST1"], drives["EST2"]
-    rates = {name: np.rad2deg(drives[name].w_felt[:, 2]) for name in _TURNS}
-    _curves(upper, first.time, np.rad2deg(first.w_wanted[:, 2]), rates, "yaw rate, deg/s")
+    rates = {name: np.rad2deg(drives[name].w_simulator[:, 2]) for name in _TURNS}
+    _curves(upper, first.time, np.rad2deg(first.w_reference[:, 2]), rates, "yaw rate, deg/s")
     upper.set_xlabel("")
     lower.plot(
         second.time,
-        np.rad2deg(second.w_felt[:, 2] - second.w_wanted[:, 2]),
+        np.rad2deg(second.w_simulator[:, 2] - second.w_reference[:, 2]),
         color="C1",
         label="EST2 less car",
     )
@@ -122,7 +126,7 @@ def _braking(drives: Drives) -> Figure:
     figure = new_figure(8.0, 4.2)
     axes = figure.subplots()
     t = drives["BRK"]
-    _curves(axes, t.time, t.f_wanted[:, 0], {"BRK": t.f_felt[:, 0]}, "$f_x$, m/s²")
+    _curves(axes, t.time, t.f_reference[:, 0], {"BRK": t.f_simulator[:, 0]}, "$f_x$, m/s²")
     _in_g(axes)
     return figure
 
@@ -131,8 +135,8 @@ def _lane_change(drives: Drives) -> Figure:
     figure = new_figure(8.0, 4.2)
     axes = figure.subplots()
     t = drives["LC1"]
-    simulators = {name: drives[name].f_felt[:, 1] for name in ("LC1", "LC2")}
-    _curves(axes, t.time, t.f_wanted[:, 1], simulators, "$f_y$, m/s²")
+    simulators = {name: drives[name].f_simulator[:, 1] for name in ("LC1", "LC2")}
+    _curves(axes, t.time, t.f_reference[:, 1], simulators, "$f_y$, m/s²")
     _in_g(axes)
     return figure
 

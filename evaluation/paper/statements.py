@@ -53,7 +53,7 @@ Drives = Mapping[str, Trajectory]
 
 def beginning(trajectory: Trajectory) -> int:
     """First sample at which the car's horizontal specific force exceeds 0.1 m/s^2."""
-    return int(np.argmax(np.hypot(*trajectory.f_wanted[:, :2].T) > 0.1))
+    return int(np.argmax(np.hypot(*trajectory.f_reference[:, :2].T) > 0.1))
 
 
 def correlation(a: Floats, b: Floats) -> float:
@@ -89,21 +89,21 @@ def entry_and_turn(t: Trajectory) -> list[Check]:
     """EST1: side force, onset, dip, steady value, washed-out yaw rate."""
     first = beginning(t)
     onset = slice(first, first + round(ONSET_WINDOW / t.dt))
-    felt, wanted = t.f_felt[:, 1], t.f_wanted[:, 1]
-    cue = float(felt[onset].max())
-    at = first + int(np.argmax(felt[onset]))
-    dip = float(felt[at : at + round(4.0 / t.dt)].min())
-    end = float(steady(t, felt).mean())
+    simulated, reference = t.f_simulator[:, 1], t.f_reference[:, 1]
+    cue = float(simulated[onset].max())
+    at = first + int(np.argmax(simulated[onset]))
+    dip = float(simulated[at : at + round(4.0 / t.dt)].min())
+    end = float(steady(t, simulated).mean())
     rapid = float(t.time[at] - t.time[first])
-    yaw = float(steady(t, t.w_felt[:, 2]).mean() / steady(t, t.w_wanted[:, 2]).mean())
+    yaw = float(steady(t, t.w_simulator[:, 2]).mean() / steady(t, t.w_reference[:, 2]).mean())
     return [
-        Check("EST1", "peak side force in the car", "about 0.25 g", float(wanted.max()) / GRAVITY, "g", 0.23, 0.27),
+        Check("EST1", "peak side force in the car", "about 0.25 g", float(reference.max()) / GRAVITY, "g", 0.23, 0.27),
         Check("EST1", "onset cue: time to its peak", "rapid onset", rapid, "s", 0.0, 1.0),
-        Check("EST1", "onset cue over the car's peak", "below the car's", cue / float(wanted.max()), "", 0.6, 0.99),
+        Check("EST1", "onset cue over the car's peak", "below the car's", cue / float(reference.max()), "", 0.6, 0.99),
         Check("EST1", "dip after the onset, below the steady value", "a small dip", (end - dip) / end, "", 0.05, 0.35),
         Check(
             "EST1", "steady side force over the car's", "the right steady value",
-            end / float(steady(t, wanted).mean()), "", 0.95, 1.05,
+            end / float(steady(t, reference).mean()), "", 0.95, 1.05,
         ),
         Check("EST1", "yaw rate at the end over the car's", "washed out", yaw, "", -0.05, 0.1),
     ]  # fmt: skip
@@ -115,7 +115,7 @@ def predicted_ripple(t: Trajectory) -> Floats:
     fL is taken as the car's horizontal specific force, which is slow here.
     """
     theta, psi = t.hexapod[:, 4], t.turntable
-    low = t.f_wanted[:, :2]
+    low = t.f_reference[:, :2]
     return np.asarray(
         t.turntable_rate / GRAVITY * np.sin(theta) * (low[:, 1] * np.sin(psi) - low[:, 0] * np.cos(psi))
     )
@@ -124,10 +124,10 @@ def predicted_ripple(t: Trajectory) -> Floats:
 def opened_yaw(est1: Trajectory, t: Trajectory) -> list[Check]:
     """EST2: the yaw rate tends to the car's, with the ripple of Eq. (54); the tilt angles oscillate."""
     late = t.time > t.time[-1] - 3.0 * SETTLED
-    ripple = (t.w_felt[:, 2] - t.w_wanted[:, 2])[late]
+    ripple = (t.w_simulator[:, 2] - t.w_reference[:, 2])[late]
     predicted = predicted_ripple(t)[late]
-    yaw = float(np.mean(t.w_felt[late, 2]) / np.mean(t.w_wanted[late, 2]))
-    difference = float(np.sqrt(np.mean((t.f_felt[:, 1] - est1.f_felt[:, 1]) ** 2)))
+    yaw = float(np.mean(t.w_simulator[late, 2]) / np.mean(t.w_reference[late, 2]))
+    difference = float(np.sqrt(np.mean((t.f_simulator[:, 1] - est1.f_simulator[:, 1]) ** 2)))
     swing = math.degrees(float(np.ptp(t.hexapod[late, 3])))
     size = float(np.ptp(ripple) / np.ptp(predicted))
     return [
@@ -142,9 +142,9 @@ def opened_yaw(est1: Trajectory, t: Trajectory) -> list[Check]:
 def without_turntable(est1: Trajectory, t: Trajectory) -> list[Check]:
     """EST3: mainly lateral carriage travel, a very short yaw cue, side force as EST1."""
     travel = np.ptp(t.carriage, axis=0)
-    yaw = t.w_felt[:, 2]
+    yaw = t.w_simulator[:, 2]
     short = float(np.count_nonzero(yaw > 0.5 * yaw.max()) * t.dt)
-    difference = float(np.sqrt(np.mean((t.f_felt[:, 1] - est1.f_felt[:, 1]) ** 2)))
+    difference = float(np.sqrt(np.mean((t.f_simulator[:, 1] - est1.f_simulator[:, 1]) ** 2)))
     return [
         Check("EST3", "carriage travel along over across", "primarily lateral", float(travel[0] / travel[1]), "", 0.0, 0.25),
         Check("EST3", "carriage travel along", "a small one is present", float(travel[0]), "m", 0.005, 1.0),
@@ -157,16 +157,16 @@ def without_turntable(est1: Trajectory, t: Trajectory) -> list[Check]:
 def braking(t: Trajectory) -> list[Check]:
     """BRK: onset, sag, transient at the stop, false cue after it, and 21 m of carriage."""
     first = beginning(t)
-    felt, wanted = t.f_felt[:, 0], t.f_wanted[:, 0]
-    stop = first + int(np.argmax(wanted[first:] > -0.1))
-    onset = float(felt[first : first + round(ONSET_WINDOW / t.dt)].min())
-    sag = float(felt[first + round(ONSET_WINDOW / t.dt) : stop].max())
+    simulated, reference = t.f_simulator[:, 0], t.f_reference[:, 0]
+    stop = first + int(np.argmax(reference[first:] > -0.1))
+    onset = float(simulated[first : first + round(ONSET_WINDOW / t.dt)].min())
+    sag = float(simulated[first + round(ONSET_WINDOW / t.dt) : stop].max())
     around = slice(stop - round(0.6 / t.dt), stop + round(0.6 / t.dt))
-    transient = float(np.ptp(felt[around]) / np.ptp(wanted[around]))
-    false_cue = float(-felt[stop + round(1.0 / t.dt) :].min() / GRAVITY)
+    transient = float(np.ptp(simulated[around]) / np.ptp(reference[around]))
+    false_cue = float(-simulated[stop + round(1.0 / t.dt) :].min() / GRAVITY)
     travel = float(np.ptp(t.carriage[:, 0]))
     reach = float(np.abs(t.carriage).max())
-    plateau = float(np.median(wanted[first:stop]))
+    plateau = float(np.median(reference[first:stop]))
     return [
         Check("BRK", "deceleration of the car", "0.25 g", -plateau / GRAVITY, "g", 0.23, 0.27),
         Check("BRK", "onset over the car's", "a good onset cue", onset / plateau, "", 0.7, 1.1),
@@ -181,10 +181,10 @@ def braking(t: Trajectory) -> list[Check]:
 def full_lane_change(t: Trajectory) -> list[Check]:
     """LC1: the car's own motion, nearly."""
     travel = np.ptp(t.carriage, axis=0)
-    yaw = correlation(t.w_felt[:, 2], t.w_wanted[:, 2])
-    force = correlation(t.f_felt[:, 1], t.f_wanted[:, 1])
+    yaw = correlation(t.w_simulator[:, 2], t.w_reference[:, 2])
+    force = correlation(t.f_simulator[:, 1], t.f_reference[:, 1])
     return [
-        Check("LC1", "peak side force in the car", "about 0.125 g", float(np.abs(t.f_wanted[:, 1]).max() / GRAVITY), "g", 0.115, 0.15),
+        Check("LC1", "peak side force in the car", "about 0.125 g", float(np.abs(t.f_reference[:, 1]).max() / GRAVITY), "g", 0.115, 0.15),
         Check("LC1", "carriage travel across", "approximately 4 m", float(travel[1]), "m", 3.5, 4.5),
         Check("LC1", "carriage travel along", "very small", float(travel[0]), "m", 0.0, 0.5),
         Check("LC1", "correlation of f_y with the car's", "almost perfect", force, "", 0.99, 1.0),
@@ -194,9 +194,9 @@ def full_lane_change(t: Trajectory) -> list[Check]:
 
 def reduced_lane_change(lc1: Trajectory, t: Trajectory) -> list[Check]:
     """LC2: without turntable and carriage the force degrades, the yaw rate does not."""
-    yaw = correlation(t.w_felt[:, 2], t.w_wanted[:, 2])
-    force = correlation(t.f_felt[:, 1], t.f_wanted[:, 1])
-    best = correlation(lc1.f_felt[:, 1], lc1.f_wanted[:, 1])
+    yaw = correlation(t.w_simulator[:, 2], t.w_reference[:, 2])
+    force = correlation(t.f_simulator[:, 1], t.f_reference[:, 1])
+    best = correlation(lc1.f_simulator[:, 1], lc1.f_reference[:, 1])
     moved = float(max(np.abs(t.carriage).max(), np.abs(t.turntable).max()))
     return [
         Check("LC2", "correlation of f_y with the car's, LC1 less LC2", "degraded", best - force, "", 0.2, 2.0),

@@ -1,4 +1,4 @@
-"""One look for every figure: colours that everyone can tell apart (Okabe and Ito), light grid, units."""
+"""One look for every figure: colors that everyone can tell apart (Okabe and Ito), light grid, units."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FLOOR: Final = 0.01
 """Least J on a logarithmic axis: what lies below is perfect to anyone, and is marked there."""
 LOWEST_SHARE: Final = -1.0
 """Least share of the gap that is drawn; what lies below is marked there."""
-_COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+_COLORS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _DASHES: Final = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 _STILL_STYLE: Final = {"color": "#8a8a8a", "linestyle": (0, (2, 2)), "linewidth": 1.0}
 
@@ -40,7 +40,7 @@ RC: Final[Mapping[str, Any]] = {
     "axes.grid": True,
     "axes.labelsize": 8.5,
     "axes.linewidth": 0.7,
-    "axes.prop_cycle": cycler(color=_COLOURS),
+    "axes.prop_cycle": cycler(color=_COLORS),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",
@@ -77,12 +77,12 @@ def new_figure(width: float, height: float, **layout: Any) -> Figure:
 
 
 def line_styles(policies: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Colour and dash of each policy; the same for the same list, so that all figures agree."""
+    """Color and dash of each policy; the same for the same list, so that all figures agree."""
     moving = [name for name in policies if name != STILL]
     styles: dict[str, dict[str, Any]] = {STILL: dict(_STILL_STYLE)}
     for i, name in enumerate(moving):
-        dash = _DASHES[(i // len(_COLOURS)) % len(_DASHES)]
-        styles[name] = {"color": _COLOURS[i % len(_COLOURS)], "linestyle": dash}
+        dash = _DASHES[(i // len(_COLORS)) % len(_DASHES)]
+        styles[name] = {"color": _COLORS[i % len(_COLORS)], "linestyle": dash}
     return {name: styles[name] for name in policies}
 
 
@@ -144,7 +144,7 @@ def maneuver_figure(
 
     Args:
         drives: Trajectory of each policy (at least one), all of the same cues.
-        policies: All policies of the evaluation, so that each keeps its colour from figure to figure, as far
+        policies: All policies of the evaluation, so that each keeps its color from figure to figure, as far
             as all are shown.
         criteria: Thresholds to draw.
     """
@@ -253,9 +253,9 @@ def _travel(row: Any, drives: Drives, styles: Styles) -> None:
 
 def _legs(axes: Axes, drives: Drives, styles: Styles) -> None:
     for name, drive in drives.items():
-        colour = styles[name]["color"]
+        color = styles[name]["color"]
         lowest, highest = drive.legs.min(axis=1), drive.legs.max(axis=1)
-        axes.fill_between(drive.time, lowest, highest, color=colour, alpha=0.18, linewidth=0.0)
+        axes.fill_between(drive.time, lowest, highest, color=color, alpha=0.18, linewidth=0.0)
         axes.plot(drive.time, lowest, drive.time, highest, **{**styles[name], "linewidth": 0.9})
     _widen(axes, 0.1)
     _limits(axes, drives, _LEGS, 1.0, "m")

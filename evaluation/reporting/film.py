@@ -22,7 +22,7 @@ Picture = NDArray[np.uint8]
 
 SUFFIXES: Final = (".gif", ".mp4", ".png")
 """Kinds of file :func:`save_film` writes."""
-_GIF_COLOURS: Final = 256
+_GIF_COLORS: Final = 256
 _SWATCH_HEIGHT: Final = 3
 _CODEC: Final = "libx264"
 _QUALITY: Final = 7
@@ -42,13 +42,13 @@ def film_frames(
         end: Time of the last frame, s; default: the end of the drive.
     """
     history = CueHistory(trajectory.maneuver, trajectory.policy, trajectory.dt)
-    wanted = np.hstack([trajectory.f_wanted, trajectory.w_wanted])
-    felt = np.hstack([trajectory.f_felt, trajectory.w_felt])
+    reference = np.hstack([trajectory.f_reference, trajectory.w_reference])
+    simulated = np.hstack([trajectory.f_simulator, trajectory.w_simulator])
     row = -1
     for k in frame_rows(trajectory, rate, begin, end):
         while row < k:
             row += 1
-            history.append(trajectory.time[row], wanted[row], felt[row])
+            history.append(trajectory.time[row], reference[row], simulated[row])
         yield renderer.frame(view_of(trajectory, k), history)
 
 
@@ -131,7 +131,7 @@ def gif_rate(rate: float) -> float:
 
 def _gif(first: Picture, rest: Iterable[Picture], rate: float) -> bytes:
     """An endless GIF of one palette, without dither, so that still parts stay still."""
-    palette = _image(np.concatenate([first, _swatches(first.shape[1])])).quantize(_GIF_COLOURS)
+    palette = _image(np.concatenate([first, _swatches(first.shape[1])])).quantize(_GIF_COLORS)
 
     def indexed(frame: Picture) -> Any:
         return _image(frame).quantize(palette=palette, dither=0)
@@ -150,10 +150,18 @@ def _gif(first: Picture, rest: Iterable[Picture], rate: float) -> bytes:
 
 
 def _swatches(width: int) -> Picture:
-    """Colours that later frames will need and the first may lack, (height, width, 3)."""
-    uses = [theme.colour_of_use(use) for use in (0.0, 0.6, 0.7, 0.8, 0.9, 1.0)]
-    bright = [theme.WANTED, theme.FELT, theme.TRAVEL, theme.SKIN, theme.SHIRT, theme.TAIL_LIGHT, *uses]
-    shades = [theme.blend(theme.CARD, colour, weight) for colour in bright for weight in (0.2, 0.6, 1.0)]
+    """Colors that later frames will need and the first may lack, (height, width, 3)."""
+    uses = [theme.color_of_use(use) for use in (0.0, 0.6, 0.7, 0.8, 0.9, 1.0)]
+    bright = [
+        theme.REFERENCE,
+        theme.SIMULATOR,
+        theme.TRAVEL,
+        theme.SKIN,
+        theme.SHIRT,
+        theme.TAIL_LIGHT,
+        *uses,
+    ]
+    shades = [theme.blend(theme.CARD, color, weight) for color in bright for weight in (0.2, 0.6, 1.0)]
     rows = np.repeat(np.array(shades, dtype=np.uint8), _SWATCH_HEIGHT, axis=0)
     return np.repeat(rows[:, None], width, axis=1)
 

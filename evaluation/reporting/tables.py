@@ -94,7 +94,7 @@ def axis_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
         "policy and axis",
         "RMSE",
         "unit",
-        "normalised",
+        "normalized",
         "correlation",
         "delay s",
         "false %",

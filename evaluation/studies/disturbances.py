@@ -31,7 +31,10 @@ Array = NDArray[Any]
 NOISE_VERSION: Final = 2
 """Of what noise is: drives of another one are driven again. 1 was a constant for policies without memory."""
 
-_KINDS = (("wanted_force", "felt_force", "force_error"), ("wanted_rate", "felt_rate", "rate_error"))
+_KINDS = (
+    ("reference_force", "simulator_force", "force_error"),
+    ("reference_rate", "simulator_rate", "rate_error"),
+)
 _ERRORS = {row.name: row.scale for row in DIFFERENCE}
 
 
@@ -99,11 +102,13 @@ class _Behind(Wrapped):
     def _noisy(self, observation: Array) -> Array:
         seen = np.array(observation)
         shape = (*seen.shape[:-1], 3)
-        for (wanted, felt, error), size in zip(_KINDS, (self._noise.force, self._noise.rate), strict=True):
+        for (reference, simulated, error), size in zip(
+            _KINDS, (self._noise.force, self._noise.rate), strict=True
+        ):
             in_car, in_cab = self._draw.normal(scale=size, size=(2, *shape))
             in_cab *= self.in_cab
-            seen[..., SLICES[wanted]] += in_car / SCALES[wanted]
-            seen[..., SLICES[felt]] += in_cab / SCALES[felt]
+            seen[..., SLICES[reference]] += in_car / SCALES[reference]
+            seen[..., SLICES[simulated]] += in_cab / SCALES[simulated]
             if error in self.errors:
                 seen[..., self.errors[error]] += (in_car - in_cab) / _ERRORS[error]
         return seen
@@ -115,7 +120,7 @@ class _TaskBehind(_Behind):
     def __init__(self, policy: TaskPolicy, noise: SensorNoise) -> None:
         super().__init__(policy, noise)
         self.task = policy.task
-        self.in_cab = float(policy.task.observation.felt == "machine")
+        self.in_cab = float(policy.task.observation.simulator_cue == "machine")
         self.base_policy = getattr(policy, "base_policy", None)
         layout = getattr(policy, "layout", None)
         self.errors = {} if layout is None else {name: layout.slices[name] for name in _ERRORS}
@@ -150,13 +155,13 @@ class Disturbances:
             motion by 2 / lag.
         dead_time: Of the actuators, s.
         noise: Of the sensors.
-        fierceness: Factor on all accelerations of the drives; see :func:`fiercer`.
+        time_scaling: Factor on all accelerations of the drives; see :func:`fiercer`.
     """
 
     lag: Positive = 30.0
     dead_time: Positive = 0.05
     noise: SensorNoise = SensorNoise()
-    fierceness: Annotated[float, Field(ge=1.0, le=4.0)] = 2.0
+    time_scaling: Annotated[float, Field(ge=1.0, le=4.0)] = 2.0
 
 
 def fiercer(cues: CueTrace, factor: float) -> CueTrace:
@@ -273,7 +278,7 @@ class Study:
         return replace(self._nominal, name="noise", description=description, make=make, about=about)
 
     def _fierce(self) -> Condition:
-        factor = self.disturbances.fierceness
+        factor = self.disturbances.time_scaling
         drives = {name: partial(_fiercer, source, factor) for name, source in self._nominal.maneuvers.items()}
         description = f"the same ways {math.sqrt(factor):.2f} times as fast, with {factor:g} times the forces"
         return replace(self._nominal, name="fierce", description=description, maneuvers=drives)

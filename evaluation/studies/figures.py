@@ -17,9 +17,9 @@ from ..reporting.text import how_many, number
 from .results import StudyResults, Summary
 
 _WORST_RATIO: Final = 4.0
-"""Ratio of J at which the darkest colour is reached."""
+"""Ratio of J at which the darkest color is reached."""
 _TICKS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Of the colour bar."""
+"""Of the color bar."""
 _BRIGHT: Final = 2.4
 """Ratio from which on numbers are white."""
 
@@ -86,16 +86,16 @@ def _lines(axes: Axes, results: StudyResults, value: Callable[[Summary], float |
         low = values < floor
         shown = np.where(low, floor, values)
         axes.plot(range(len(values)), shown, label=policy, **styles[policy])
-        colour = styles[policy]["color"]
+        color = styles[policy]["color"]
         for marker, chosen in (("o", ~low), ("v", low)):
-            axes.plot(np.flatnonzero(chosen), shown[chosen], marker, markersize=5.0, color=colour)
+            axes.plot(np.flatnonzero(chosen), shown[chosen], marker, markersize=5.0, color=color)
         below = below or bool(low.any())
     if below:
         axes.set_title(f"▾ below {floor:g}", loc="right", fontsize=7.5, fontweight="normal", color="#5d6878")
 
 
 def heat_figure(results: StudyResults) -> bytes | None:
-    """A PNG of J by policy and condition, coloured by J over that of the first condition.
+    """A PNG of J by policy and condition, colored by J over that of the first condition.
 
     None where nothing was driven.
     """
@@ -111,9 +111,9 @@ def heat_figure(results: StudyResults) -> bytes | None:
         for i, policy in enumerate(policies):
             for j, condition in enumerate(names):
                 found = results.summaries.get(condition, {}).get(policy)
-                colour = "white" if found is not None and (found.ratio or 1.0) > _BRIGHT else CAR
+                color = "white" if found is not None and (found.ratio or 1.0) > _BRIGHT else CAR
                 text = _told(found, j == 0)
-                axes.text(j, i, text, ha="center", va="center", fontsize=8, color=colour)
+                axes.text(j, i, text, ha="center", va="center", fontsize=8, color=color)
         axes.set_xticks(range(len(names)), names)
         axes.set_yticks(range(len(policies)), policies)
         axes.tick_params(length=0)

@@ -132,7 +132,7 @@ def common_maneuvers(metrics: Mapping[str, Mapping[str, Mapping[str, Metrics]]])
     return tuple(name for name in (pairs[0] if pairs else ()) if all(name in drives for drives in pairs))
 
 
-def summarise(
+def summarize(
     metrics: Mapping[str, Mapping[str, Mapping[str, Metrics]]], criteria: Criteria | None = None
 ) -> dict[str, dict[str, Summary]]:
     """Each policy under each condition, over the common maneuvers.

@@ -257,7 +257,7 @@ def test_what_is_felt_is_the_acceleration_and_gravity_in_the_tilted_cab():
     acceleration = np.diff(frame["velocity"][:, 0]) / DT
     turning = np.diff(frame["tilt_rate"][:, 1]) / DT * machine.cab.reference_point[2]
     expected = acceleration + turning + 9.81 * frame["tilt"][1:, 1]
-    np.testing.assert_allclose(felt.f_felt[2:, 0], expected, atol=1e-4 * SMALL)
+    np.testing.assert_allclose(felt.f_simulator[2:, 0], expected, atol=1e-4 * SMALL)
 
 
 def test_a_sustained_force_ends_as_tilt_and_a_sustained_turn_goes_on():
@@ -267,11 +267,11 @@ def test_a_sustained_force_ends_as_tilt_and_a_sustained_turn_goes_on():
     )
     felt = rollout(OptimalWashout(OPEN), drive, PAPER)
     assert not felt.limits_active.any()
-    assert felt.f_felt[-1, 0] == pytest.approx(1.0, abs=0.3)
+    assert felt.f_simulator[-1, 0] == pytest.approx(1.0, abs=0.3)
     assert np.abs(felt.carriage[-1]).max() < 0.3 * np.abs(felt.carriage[:, 0]).max()
     turning = trace(10.0, rate=lambda t: np.column_stack([0.0 * t, 0.0 * t, np.full_like(t, 0.1)]))
     felt = rollout(OptimalWashout(OPEN), turning, PAPER)
-    assert felt.w_felt[-1, 2] == pytest.approx(0.1, rel=0.3)
+    assert felt.w_simulator[-1, 2] == pytest.approx(0.1, rel=0.3)
     assert felt.turntable[-1] > 0.5
 
 
@@ -284,8 +284,8 @@ def test_in_a_turn_the_force_stays_where_the_driver_is():
         lambda t: np.column_stack([0.0 * t, 0.0 * t, rate * np.clip(0.2 * t, 0.0, 1.0)]),
     )
     felt = rollout(OptimalWashout(OPEN), drive, boundless())
-    assert felt.f_felt[-500:, 1].mean() == pytest.approx(1.5, rel=0.2)
-    assert abs(felt.f_felt[-500:, 0].mean()) < 0.4
+    assert felt.f_simulator[-500:, 1].mean() == pytest.approx(1.5, rel=0.2)
+    assert abs(felt.f_simulator[-500:, 0].mean()) < 0.4
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
@@ -314,7 +314,7 @@ def test_it_begins_where_the_machine_is():
     drive = trace(2.0)
     felt = rollout(OptimalWashout(replace(OPEN, start_carriage=(3.0, -2.0))), drive, PAPER)
     np.testing.assert_allclose(felt.carriage, np.tile([3.0, -2.0], (len(felt.time), 1)), atol=1e-9)
-    np.testing.assert_allclose(felt.f_felt[:, :2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(felt.f_simulator[:, :2], 0.0, atol=1e-9)
 
 
 def test_dearer_displacement_means_less_of_it_and_dearer_tilt_rate_slower_tilt():

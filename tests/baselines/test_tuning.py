@@ -1,4 +1,4 @@
-"""Searches for a washout's parameters: the space, what is minimised, and both methods."""
+"""Searches for a washout's parameters: the space, what is minimized, and both methods."""
 
 from __future__ import annotations
 

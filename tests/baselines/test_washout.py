@@ -60,17 +60,19 @@ def test_without_filters_the_driver_feels_the_car():
     felt = rollout(ClassicalWashout(open_washout()), drive, boundless())
     assert not felt.limits_active.any()
     # The action of a sample acts until the next one: what is felt is one sample old.
-    error = felt.f_felt[1:] - felt.f_wanted[:-1]
+    error = felt.f_simulator[1:] - felt.f_reference[:-1]
     assert np.abs(error[5:]).max() < 0.03
-    assert np.abs(felt.w_felt[2:] - felt.w_wanted[:-2])[5:].max() < 0.01
+    assert np.abs(felt.w_simulator[2:] - felt.w_reference[:-2])[5:].max() < 0.01
     assert np.abs(felt.turntable).max() > 0.5
 
 
 def test_scaling_and_limiting_of_the_inputs():
     scaled = replace(open_washout(), force_scale=(0.5, 1.0, 1.0), force_limit=(10.0, 1.0, 10.0))
     felt = rollout(ClassicalWashout(scaled), trace(10.0, weave), boundless())
-    np.testing.assert_allclose(felt.f_felt[6:, 0], 0.5 * felt.f_wanted[5:-1, 0], atol=0.02)
-    np.testing.assert_allclose(felt.f_felt[6:, 1], np.clip(felt.f_wanted[5:-1, 1], -1.0, 1.0), atol=0.02)
+    np.testing.assert_allclose(felt.f_simulator[6:, 0], 0.5 * felt.f_reference[5:-1, 0], atol=0.02)
+    np.testing.assert_allclose(
+        felt.f_simulator[6:, 1], np.clip(felt.f_reference[5:-1, 1], -1.0, 1.0), atol=0.02
+    )
 
 
 def test_the_translational_path_is_hps_times_hpi():
@@ -83,7 +85,7 @@ def test_the_translational_path_is_hps_times_hpi():
     felt = rollout(ClassicalWashout(filtered), drive, boundless())
     late = felt.time > 40.0
     basis = np.column_stack([np.sin(omega * felt.time[late]), np.cos(omega * felt.time[late])])
-    (a, b), *_ = np.linalg.lstsq(basis, felt.f_felt[late, 1], rcond=None)
+    (a, b), *_ = np.linalg.lstsq(basis, felt.f_simulator[late, 1], rcond=None)
     s = 1j * omega
     expected = 0.8 * s**2 / (s + w_s) ** 2 * s / (s + w_i) * np.exp(-0.5 * s * 0.01)
     assert a + 1j * b == pytest.approx(expected, abs=0.01)
@@ -109,7 +111,7 @@ def test_a_sustained_force_ends_as_tilt_at_the_limited_rate():
     step = trace(20.0, lambda t: np.column_stack([np.where(t > 1.0, 1.5, 0.0), np.zeros_like(t)]))
     tilt = TiltCoordination(rate=np.radians(3.0), acceleration=np.radians(8.0))
     felt = rollout(ClassicalWashout(replace(load_washout("est1"), tilt=tilt)), step)
-    assert felt.f_felt[-1, 0] == pytest.approx(1.5, abs=0.05)
+    assert felt.f_simulator[-1, 0] == pytest.approx(1.5, abs=0.05)
     assert np.abs(felt.hexapod_rate[:, 3:5]).max() <= np.radians(3.0) + 1e-9
 
 
@@ -165,7 +167,7 @@ def test_it_begins_where_the_machine_is():
     start = np.array([5.0, -3.0, 0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 2.0])
     felt = rollout(ClassicalWashout("est1"), trace(5.0), start=start)
     np.testing.assert_allclose(felt.turntable, 2.0, atol=1e-6)
-    np.testing.assert_allclose(felt.f_felt[1], [0.0, 0.0, -9.81], atol=0.6)
+    np.testing.assert_allclose(felt.f_simulator[1], [0.0, 0.0, -9.81], atol=0.6)
     # LPC hands the hexapod's offset over to the carriage; the sum stays.
     np.testing.assert_allclose(felt.carriage[-1] + felt.hexapod[-1, :2], [5.1, -2.95], atol=1e-3)
 
@@ -177,8 +179,8 @@ def test_a_turned_start_is_no_cue(name, axis, angle):
     start = np.zeros(9)
     start[axis] = angle
     felt = rollout(ClassicalWashout(name), trace(6.0), start=start)
-    np.testing.assert_allclose(felt.f_felt, np.tile([0.0, 0.0, -9.81], (len(felt.time), 1)), atol=1e-6)
-    np.testing.assert_allclose(felt.w_felt, 0.0, atol=1e-6)
+    np.testing.assert_allclose(felt.f_simulator, np.tile([0.0, 0.0, -9.81], (len(felt.time), 1)), atol=1e-6)
+    np.testing.assert_allclose(felt.w_simulator, 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("gain", [0.7, 1.0, 1.5])
@@ -191,7 +193,7 @@ def test_a_scaled_turntable_leaves_the_sustained_force_where_it_belongs(gain):
     steady = trace(40.0, lambda t: np.column_stack([0.0 * t, np.clip(t - 1.0, 0.0, 1.5)]), rate)
     parameters = replace(load_washout("classical"), force_scale=(1.0, 1.0, 1.0), turntable_gain=gain)
     felt = rollout(ClassicalWashout(parameters), steady)
-    np.testing.assert_allclose(felt.f_felt[-1, :2], [0.0, 1.5], atol=0.05)
+    np.testing.assert_allclose(felt.f_simulator[-1, :2], [0.0, 1.5], atol=0.05)
 
 
 def test_its_start_pose_is_a_parameter():
@@ -242,7 +244,7 @@ def test_every_policy_keeps_the_protocol(name):
 def test_no_motion_does_not_move():
     felt = rollout(NoMotion(), trace(3.0, weave, yawing))
     assert not felt.applied.any()
-    np.testing.assert_array_equal(felt.f_felt, np.tile([0.0, 0.0, -9.81], (len(felt.time), 1)))
+    np.testing.assert_array_equal(felt.f_simulator, np.tile([0.0, 0.0, -9.81], (len(felt.time), 1)))
 
 
 def test_a_policy_from_a_file(tmp_path):

@@ -74,7 +74,7 @@ def test_the_city_drive_turns_as_its_log_says(start: float, end: float, change: 
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("city-drive", ["Paul Balzer", "CC BY-SA 2.0", "same licence", "Changed", "motion-cueing import"]),
+        ("city-drive", ["Paul Balzer", "CC BY-SA 2.0", "same license", "Changed", "motion-cueing import"]),
         ("commute", ["Copyright (c) 2018 comma.ai", "MIT License", "Changed", "motion-cueing import"]),
     ],
 )

@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.signal import csd, welch
 
 from motion_cueing.envs.car import get_car
+from motion_cueing.envs.car.road_roughness import SPACING, RoadRoughness, _sprung, shaking
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.maneuvers import RandomDrives, random_drive, random_drives
-from motion_cueing.envs.maneuvers.road_roughness import SPACING, Unevenness, _sprung, shaking
 from motion_cueing.envs.settings import from_dict
 
 CAR = get_car("sedan")
@@ -20,7 +20,7 @@ DT = 0.01
 
 
 def test_tracks_have_the_spectrum_of_iso_8608():
-    road = Unevenness.drawn(64e-6, 40_000.0, np.random.default_rng(0))
+    road = RoadRoughness.drawn(64e-6, 40_000.0, np.random.default_rng(0))
     for side in (road.left, road.right):
         n, density = welch(side, 1.0 / SPACING, nperseg=8192)
         for low, high in ((0.2, 0.5), (0.5, 1.0), (1.0, 2.0)):
@@ -57,7 +57,7 @@ def test_a_leaning_road_leans_the_car(pitch, roll):
     stations = SPACING * np.arange(4000)
     rise = pitch * np.maximum(stations - 20.0, 0.0)
     lean = 0.5 * roll * 0.85 * CAR.width * np.clip(stations - 20.0, 0.0, 1.0)
-    added = shaking(CAR, Unevenness(rise + lean, rise - lean), distance, DT)
+    added = shaking(CAR, RoadRoughness(rise + lean, rise - lean), distance, DT)
     settled = np.array([GRAVITY * pitch, -GRAVITY * roll, 0.0])
     np.testing.assert_allclose(added.force[-1], settled, atol=1e-3)
     np.testing.assert_allclose(added.rate[-1], 0.0, atol=1e-5)

@@ -10,12 +10,12 @@ import numpy as np
 from motion_cueing.baselines.washout import ClassicalWashout, ScheduledWashout
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.maneuvers import RandomDrives
-from motion_cueing.envs.platform.randomization import BuildRanges
+from motion_cueing.envs.platform.randomization import PlatformRanges
 from motion_cueing.envs.task import (
     ActionOptions,
     EpisodeOptions,
     ObservationOptions,
-    RandomisationOptions,
+    RandomizationOptions,
     RewardOptions,
     RewardWeights,
 )
@@ -43,21 +43,21 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     "offset": {"episode": replace(SHORT, platform_offset=0.5)},
     "cars": {
         "episode": replace(SHORT, random=RandomDrives(cars=("sedan", "bmw-320i"))),
-        "randomisation": RandomisationOptions(friction=(0.7, 1.0)),
+        "randomization": RandomizationOptions(friction=(0.7, 1.0)),
     },
     "actuators": {
-        "randomisation": RandomisationOptions(
+        "randomization": RandomizationOptions(
             natural_frequency=(20.0, 60.0), dead_time=(0.0, 0.05), machines=3
         )
     },
     "builds": {
         "observation": ObservationOptions(machine=True),
-        "randomisation": RandomisationOptions(
-            build=BuildRanges(travel=(0.5, 1.0), size=(0.4, 1.0), without_carriage=0.5), machines=3
+        "randomization": RandomizationOptions(
+            build=PlatformRanges(travel=(0.5, 1.0), size=(0.4, 1.0), without_carriage=0.5), machines=3
         ),
     },
     "sensors": {
-        "randomisation": RandomisationOptions(
+        "randomization": RandomizationOptions(
             actuator_gain=0.1, sensor_gain=0.1, force_noise=0.05, rate_noise=0.01
         )
     },

@@ -9,7 +9,7 @@ from motion_cueing.baselines import ClassicalWashout
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.platform.kernels.step import AXES
 from motion_cueing.envs.platform.kinematics import legs_of_pose
-from motion_cueing.envs.task import ActionOptions, DrivingSimulator, RandomisationOptions
+from motion_cueing.envs.task import ActionOptions, DrivingSimulator, RandomizationOptions
 from motion_cueing.envs.task.observation import acceleration_scale, velocity_scale
 
 from .tasks import drive
@@ -113,7 +113,7 @@ def test_repeated_action_is_held_and_its_reward_is_the_mean():
 
 
 def test_gain_errors_of_actuators_scale_what_is_applied():
-    env = env_with(randomisation=RandomisationOptions(actuator_gain=0.2))
+    env = env_with(randomization=RandomizationOptions(actuator_gain=0.2))
     env.step(np.full(9, 0.1))
     ratio = applied(env) / (0.1 * env.scale)
     assert np.all(np.abs(ratio - 1.0) <= 0.2 + 1e-6)

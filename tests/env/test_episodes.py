@@ -13,7 +13,7 @@ from motion_cueing.envs.task import (
     DrivingSimulator,
     DrivingSimulatorVector,
     EpisodeOptions,
-    RandomisationOptions,
+    RandomizationOptions,
 )
 from motion_cueing.envs.task.draws import key_of, uniform, words
 from motion_cueing.envs.task.drives import library_of
@@ -35,7 +35,7 @@ def test_episode_is_the_whole_drive_from_its_first_cue_to_its_last():
     env = DrivingSimulator(drives=[cues])
     env.reset(seed=0)
     assert length_of(env) == 100
-    assert np.array_equal(env.batch.simulator.state["wanted"]["force"][0], cues.specific_force[-1])
+    assert np.array_equal(env.batch.simulator.state["reference_cue"]["force"][0], cues.specific_force[-1])
 
 
 def test_random_start_is_anywhere_that_leaves_the_duration():
@@ -76,7 +76,7 @@ def test_random_drives_are_those_of_their_seeds():
 def test_every_car_drives_every_maneuver_and_friction_changes_the_drive():
     episode = EpisodeOptions(drives=("step-steer",), random=RandomDrives(cars=("sedan", "volvo-v40")))
     grip = DrivingSimulator(episode=episode).batch.drives
-    slip = DrivingSimulator(episode=episode, randomisation={"friction": (0.6, 0.7)}).batch.drives
+    slip = DrivingSimulator(episode=episode, randomization={"friction": (0.6, 0.7)}).batch.drives
     assert [cues.source.split(",")[0] for cues in grip] == ["sedan", "volvo-v40"]
     for a, b in zip(grip, slip, strict=True):
         assert np.abs(a.specific_force - b.specific_force).max() > 1e-3
@@ -86,11 +86,11 @@ def test_every_car_drives_every_maneuver_and_friction_changes_the_drive():
     ("episode", "friction", "message"),
     [
         ({"drives": ["slalom"]}, 0.6, r"friction 0\.\d\d came \d+\.\d m off the path of slalom"),
-        ({"library": 40, "drive_duration": 30.0}, 0.25, "m off the path of .*-.*: raise randomisation"),
+        ({"library": 40, "drive_duration": 30.0}, 0.25, "m off the path of .*-.*: raise randomization"),
     ],
 )
 def test_car_that_leaves_its_path_is_refused(episode, friction, message):
-    arguments = {"episode": episode, "randomisation": {"friction": (friction, friction)}}
+    arguments = {"episode": episode, "randomization": {"friction": (friction, friction)}}
     with pytest.raises(ConfigurationError, match=message):
         DrivingSimulator(**arguments)
 
@@ -101,7 +101,7 @@ def test_a_random_drive_whose_car_leaves_its_path_is_drawn_anew():
     episode = EpisodeOptions(library=16, library_seed=1, drive_duration=40.0, random=cones)
     seeds = drive_seeds(16, 1)
     first = [random_drive(seed, 40.0, drives=cones) for seed in seeds]
-    drives = library_of(episode, RandomisationOptions())
+    drives = library_of(episode, RandomizationOptions())
     same = [np.array_equal(a.specific_force, b.specific_force) for a, b in zip(drives, first, strict=True)]
     assert [k for k, equal in enumerate(same) if not equal] == [5]
     assert max(np.abs(cues.channels["path_offset_m"]).max() for cues in drives) < 1.0
@@ -124,7 +124,7 @@ def test_drives_and_machines_are_drawn_evenly():
     env = DrivingSimulatorVector(
         600,
         drives=[drive(str(k), samples=3) for k in range(3)],
-        randomisation=RandomisationOptions(natural_frequency=(10.0, 50.0), machines=2),
+        randomization=RandomizationOptions(natural_frequency=(10.0, 50.0), machines=2),
     )
     env.reset(seed=0)
     # Six sigma of a binomial count.
@@ -133,8 +133,8 @@ def test_drives_and_machines_are_drawn_evenly():
 
 
 def test_machines_have_drawn_lags_and_dead_times_within_their_ranges():
-    ranges = RandomisationOptions(natural_frequency=(20.0, 40.0), dead_time=(0.01, 0.05), machines=5)
-    platforms = DrivingSimulator(drives=[drive()], randomisation=ranges).batch.simulator.platforms
+    ranges = RandomizationOptions(natural_frequency=(20.0, 40.0), dead_time=(0.01, 0.05), machines=5)
+    platforms = DrivingSimulator(drives=[drive()], randomization=ranges).batch.simulator.platforms
     frequencies = [p.hexapod.dynamics.natural_frequency for p in platforms]
     delays = [p.carriage.dynamics.dead_time for p in platforms]
     assert len(set(frequencies)) == len(set(delays)) == 5
@@ -168,7 +168,7 @@ def test_offset_machine_begins_where_it_was_put():
     assert not state["motion"]["rate"].any()
 
 
-def test_numbers_drawn_are_uniform_and_uncorrelated_between_neighbours():
+def test_numbers_drawn_are_uniform_and_uncorrelated_between_neighbors():
     keys = np.array([key_of(seed) for seed in range(2000)], dtype=np.uint64)
     first, second = (uniform(words(keys, np.full(2000, e), 8)) for e in (0, 1))
     assert first.min() >= 0.0

@@ -165,7 +165,7 @@ def test_action_outside_the_box_is_clipped_and_counted():
         ({"action": {"mode": "residual"}}, "'residual' needs base="),
         ({"action": {"mode": "gains"}}, "'gains' needs base="),
         ({"base": object()}, "base= is of no use"),
-        ({"randomisation": {"dead_time": [0.2, 0.1]}}, "dead_time must be a range"),
+        ({"randomization": {"dead_time": [0.2, 0.1]}}, "dead_time must be a range"),
         ({"render_mode": "ansi"}, "render_mode 'ansi' is none of"),
         ({"vestibular": "nobody"}, "unknown vestibular model"),
     ],

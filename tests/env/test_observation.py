@@ -9,7 +9,7 @@ import pytest
 
 from motion_cueing.baselines.washout import ClassicalWashout
 from motion_cueing.envs.simulator.kernels.observation import ROWS, SLICES
-from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomisationOptions
+from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomizationOptions
 from motion_cueing.envs.task.observation import (
     BASE,
     COMMAND,
@@ -26,7 +26,7 @@ from motion_cueing.envs.task.observation import (
 from .tasks import drive
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
-LAG = RandomisationOptions(natural_frequency=(15.0, 15.0), machines=1)
+LAG = RandomizationOptions(natural_frequency=(15.0, 15.0), machines=1)
 
 
 def moved(steps: int = 50, **arguments) -> tuple[DrivingSimulator, np.ndarray]:
@@ -61,12 +61,12 @@ def test_cues_platform_and_legs_are_the_simulators():
     state = env.batch.simulator.state[0]
     p = state["setpoint"]
     expected = {
-        "wanted_force": state["wanted"]["force"] + GRAVITY,
-        "wanted_rate": state["wanted"]["rate"],
-        "felt_force": state["felt"]["force"] + GRAVITY,
-        "felt_rate": state["felt"]["rate"],
-        "force_error": state["wanted"]["force"] - state["felt"]["force"],
-        "rate_error": state["wanted"]["rate"] - state["felt"]["rate"],
+        "reference_force": state["reference_cue"]["force"] + GRAVITY,
+        "reference_rate": state["reference_cue"]["rate"],
+        "simulator_force": state["simulator_cue"]["force"] + GRAVITY,
+        "simulator_rate": state["simulator_cue"]["rate"],
+        "force_error": state["reference_cue"]["force"] - state["simulator_cue"]["force"],
+        "rate_error": state["reference_cue"]["rate"] - state["simulator_cue"]["rate"],
         "carriage": p["position"][:2],
         "carriage_rate": p["rate"][:2],
         "displacement": p["displacement"],
@@ -83,7 +83,7 @@ def test_cues_platform_and_legs_are_the_simulators():
     assert set(expected) == set(env.batch.layout.slices)
     for name, values in expected.items():
         assert close(row(env, observation, name), values), name
-    assert np.array_equal(state["wanted"]["force"], drive().specific_force[50])
+    assert np.array_equal(state["reference_cue"]["force"], drive().specific_force[50])
 
 
 @pytest.mark.parametrize("steps", [0, 50, 280])
@@ -99,7 +99,7 @@ def test_preview_is_the_drive_ahead_and_its_last_cue_after_its_end(steps):
 def test_perceived_rows_are_what_is_sensed():
     env, observation = moved(observation=ObservationOptions(perceived=True))
     state = env.batch.simulator.state[0]
-    for side in ("wanted", "felt"):
+    for side in ("reference_cue", "simulator_cue"):
         sensed = state[f"sensed_{side}"]
         assert close(row(env, observation, f"sensed_{side}_force"), sensed["force"] + GRAVITY)
         assert close(row(env, observation, f"sensed_{side}_rate"), sensed["rate"])
@@ -107,7 +107,7 @@ def test_perceived_rows_are_what_is_sensed():
 
 
 def test_true_motion_is_behind_the_set_points_where_actuators_lag():
-    env, observation = moved(observation=ObservationOptions(true_motion=True), randomisation=LAG)
+    env, observation = moved(observation=ObservationOptions(true_motion=True), randomization=LAG)
     true = env.batch.simulator.state[0]["motion"]
     expected = {
         "true_carriage": true["position"][:2],
@@ -141,7 +141,7 @@ def turn(env: DrivingSimulator, angle: float) -> None:
 
 def test_in_the_cabs_frame_the_machines_rows_turn_with_the_driver():
     seen = ObservationOptions(frame="cab", true_motion=True)
-    env = DrivingSimulator(drives=[drive()], observation=seen, randomisation=LAG)
+    env = DrivingSimulator(drives=[drive()], observation=seen, randomization=LAG)
     turn(env, 1.2)
     for k in range(50):
         observation, *_ = env.step(0.1 * np.sin(0.1 * k + np.arange(9)))
@@ -161,8 +161,8 @@ def test_in_the_cabs_frame_the_machines_rows_turn_with_the_driver():
             shown = row(env, observation, prefix + name)
             assert close(shown[:2], turned(values, angle)), name
             assert close(shown[2:], values[2:]), name
-    felt = state["felt"]["force"] + GRAVITY
-    assert close(row(env, observation, "felt_force"), felt)
+    felt = state["simulator_cue"]["force"] + GRAVITY
+    assert close(row(env, observation, "simulator_force"), felt)
 
 
 @pytest.mark.parametrize("mode", ["acceleration", "jerk", "velocity"])
@@ -179,7 +179,7 @@ def test_an_action_in_the_cabs_frame_moves_the_machine_the_same_way_from_any_hea
         for k in range(60):
             observation, *_ = env.step(0.02 * np.sin(0.1 * k + np.arange(9)))
         seen.append([row(env, observation, n) for n in ("carriage", "displacement", "beta", "velocity")])
-        felt.append(env.batch.simulator.state["felt"]["force"][0].copy())
+        felt.append(env.batch.simulator.state["simulator_cue"]["force"][0].copy())
     assert np.abs(seen[0][0]).max() > 0.001
     for a, b in zip(*seen, strict=True):
         assert np.allclose(a, b, atol=1e-5)
@@ -223,27 +223,29 @@ def test_command_and_base_action_are_shown_where_the_mode_needs_them():
 
 
 def test_sensors_err_in_gain_and_noise_and_only_they_do():
-    noisy = RandomisationOptions(sensor_gain=0.2, force_noise=0.3, rate_noise=0.02)
-    env, clean = DrivingSimulator(drives=[drive()], randomisation=noisy), DrivingSimulator(drives=[drive()])
+    noisy = RandomizationOptions(sensor_gain=0.2, force_noise=0.3, rate_noise=0.02)
+    env, clean = DrivingSimulator(drives=[drive()], randomization=noisy), DrivingSimulator(drives=[drive()])
     seen, expected = [env.reset(seed=1)[0]], [clean.reset(seed=1)[0]]
     for _ in range(250):
         seen.append(env.step(np.zeros(9))[0])
         expected.append(clean.step(np.zeros(9))[0])
     error = np.array(seen) - np.array(expected)
-    touched = {"felt_force": 0.03, "felt_rate": 0.02, "force_error": 0.03, "rate_error": 0.02}
+    touched = {"simulator_force": 0.03, "simulator_rate": 0.02, "force_error": 0.03, "rate_error": 0.02}
     for name, where in env.batch.layout.slices.items():
         if name not in touched:
             assert not error[:, where].any(), name
             continue
         # The standard deviation of 750 samples is within 4 standard errors of the true one.
         assert np.std(error[:, where]) == pytest.approx(touched[name], rel=4.0 / np.sqrt(2 * 750)), name
-    felt, difference = (error[:, env.batch.layout.slices[name]] for name in ("felt_force", "force_error"))
+    felt, difference = (
+        error[:, env.batch.layout.slices[name]] for name in ("simulator_force", "force_error")
+    )
     assert np.allclose(felt, -difference, atol=1e-6)
 
 
 def test_noise_differs_from_step_to_step_and_from_episode_to_episode():
-    env = DrivingSimulator(drives=[drive()], randomisation=RandomisationOptions(force_noise=0.3))
-    where = env.batch.layout.slices["felt_force"]
+    env = DrivingSimulator(drives=[drive()], randomization=RandomizationOptions(force_noise=0.3))
+    where = env.batch.layout.slices["simulator_force"]
     seen = [env.reset(seed=1)[0][where], env.step(np.zeros(9))[0][where], env.reset()[0][where]]
     assert len({part.tobytes() for part in seen}) == 3
 
@@ -289,13 +291,13 @@ def test_entries_beyond_their_bound_are_clipped():
 
 
 def test_the_models_cues_are_those_of_a_machine_that_follows_at_once():
-    noisy = RandomisationOptions(**vars(LAG) | {"sensor_gain": 0.2, "force_noise": 0.1, "rate_noise": 0.01})
-    told, modelled = moved(observation=ObservationOptions(felt="model", frame="cab"), randomisation=noisy)
+    noisy = RandomizationOptions(**vars(LAG) | {"sensor_gain": 0.2, "force_noise": 0.1, "rate_noise": 0.01})
+    told, modeled = moved(observation=ObservationOptions(felt="model", frame="cab"), randomization=noisy)
     swift, sensed = moved(observation=ObservationOptions(frame="cab"))
-    late, true = moved(observation=ObservationOptions(frame="cab"), randomisation=LAG)
-    np.testing.assert_allclose(modelled, sensed, rtol=0.0, atol=2e-5)
-    for name in ("felt_force", "felt_rate", "acceleration", "force_error", "rate_error"):
+    late, true = moved(observation=ObservationOptions(frame="cab"), randomization=LAG)
+    np.testing.assert_allclose(modeled, sensed, rtol=0.0, atol=2e-5)
+    for name in ("simulator_force", "simulator_rate", "acceleration", "force_error", "rate_error"):
         assert not close(row(late, true, name), row(swift, sensed, name)), name
     # What is felt, and counts, is the true motion's all the same.
-    felt = told.batch.simulator.state[0]["felt"]["force"]
-    assert not close(felt, row(told, modelled, "felt_force") - GRAVITY)
+    felt = told.batch.simulator.state[0]["simulator_cue"]["force"]
+    assert not close(felt, row(told, modeled, "simulator_force") - GRAVITY)

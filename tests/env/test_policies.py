@@ -22,7 +22,7 @@ from motion_cueing.evaluation import rollout
 from .tasks import drive
 
 # EST1 begins off the middle; from neutral, where an episode begins, it needs stronger high-passes.
-CENTRED = replace(
+CENTERED = replace(
     load_washout("est1"),
     hps=(HighPass(2, 0.12),) * 2,
     hpi=(HighPass(1, 0.15), HighPass(1, 0.15), HighPass(2, 2.0)),
@@ -32,15 +32,15 @@ POLICIES = {
     "no-motion": NoMotion(),
     "classical": ClassicalWashout("classical"),
     "est1": ClassicalWashout("est1"),
-    "est1-centred": ClassicalWashout(CENTRED),
+    "est1-centered": ClassicalWashout(CENTERED),
     "brk": ClassicalWashout("brk"),
 }
 
 
 def headline(state: np.ndarray) -> np.ndarray:
     """(n,) |df|^2 / 0.6^2 + |dw|^2 / (3 deg/s)^2 of every environment."""
-    force = (state["felt"]["force"] - state["wanted"]["force"]) / 0.6
-    rate = (state["felt"]["rate"] - state["wanted"]["rate"]) / math.radians(3.0)
+    force = (state["simulator_cue"]["force"] - state["reference_cue"]["force"]) / 0.6
+    rate = (state["simulator_cue"]["rate"] - state["reference_cue"]["rate"]) / math.radians(3.0)
     return np.sum(force**2 + rate**2, axis=1)
 
 
@@ -114,7 +114,7 @@ def test_washout_on_the_observation_moves_as_in_a_rollout(name):
         assert np.allclose(motion["position"][:2], expected.carriage[k], atol=1e-4)
         assert np.allclose(motion["position"][2:8], expected.legs[k], atol=1e-4)
         assert np.isclose(motion["position"][8], expected.turntable[k], atol=1e-4)
-        felt = env.batch.simulator.state["felt"][0]
-        assert np.allclose(felt["force"], expected.f_felt[k], atol=1e-3)
-        assert np.allclose(felt["rate"], expected.w_felt[k], atol=1e-4)
+        felt = env.batch.simulator.state["simulator_cue"][0]
+        assert np.allclose(felt["force"], expected.f_simulator[k], atol=1e-3)
+        assert np.allclose(felt["rate"], expected.w_simulator[k], atol=1e-4)
     assert k == len(cues) - 1

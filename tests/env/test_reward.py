@@ -25,8 +25,8 @@ def six(cues: np.void) -> np.ndarray:
 
 def expected_terms(env: DrivingSimulator, action: np.ndarray, before: np.ndarray) -> dict[str, float]:
     state = env.batch.simulator.state[0]
-    wanted, felt = six(state["wanted"]), six(state["felt"])
-    sensed = six(state["sensed_felt"]) - six(state["sensed_wanted"])
+    wanted, felt = six(state["reference_cue"]), six(state["simulator_cue"])
+    sensed = six(state["perceived_simulator"]) - six(state["perceived_reference"])
     error = ((felt - wanted) / np.array(C.scales)) ** 2
     false = [signals.false_cues(wanted[i : i + 1], felt[i : i + 1], C.thresholds[i])[0] for i in range(6)]
     extra = signals.beyond(wanted[3:5], felt[3:5])

@@ -8,11 +8,11 @@ import pytest
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.platform.parameters import axis_reach
-from motion_cueing.envs.platform.randomization import BuildRanges
+from motion_cueing.envs.platform.randomization import PlatformRanges
 from motion_cueing.envs.task import (
     DrivingSimulator,
     DrivingSimulatorVector,
-    RandomisationOptions,
+    RandomizationOptions,
     TaskOptions,
 )
 from motion_cueing.envs.task.batch import Batch
@@ -22,7 +22,7 @@ from motion_cueing.envs.task.unroll import TaskUnroll
 from .tasks import drive
 from .test_unroll import LinearPolicy, gradient_that_agrees
 
-BUILD = BuildRanges(
+BUILD = PlatformRanges(
     travel=(0.3, 1.1),
     size=(0.4, 1.1),
     shape=(0.9, 1.1),
@@ -42,7 +42,7 @@ def task(mode: str = "acceleration", **given) -> TaskOptions:
             "action": {"mode": mode, "frame": "cab", "repeat": 2, "authority": 0.3},
             "reward": {"stroke_margin": 0.2, "weights": {"stroke": 1.0, "tilt_rate": 0.5}},
             "episode": {"duration": 2.0, "random_start": True, "platform_offset": 0.4},
-            "randomisation": RandomisationOptions(build=BUILD, machines=4),
+            "randomization": RandomizationOptions(build=BUILD, machines=4),
         }
         | given
     )
@@ -127,7 +127,7 @@ def test_each_environment_is_the_one_of_its_machine_bit_for_bit(mode):
     alone = []
     for i, which in enumerate(many.simulator.platform_of.tolist()):
         machine = many.simulator.platforms[which]
-        alone.append(begun(task(mode, platform=machine, randomisation=RandomisationOptions()), [i]))
+        alone.append(begun(task(mode, platform=machine, randomization=RandomizationOptions()), [i]))
     assert len(set(many.simulator.platform_of.tolist())) > 2
     rng = np.random.default_rng(0)
     for _ in range(30):
@@ -191,15 +191,15 @@ def test_the_same_seed_draws_the_same_machines_and_another_others():
     assert not set(first.simulator.platforms) & set(other.simulator.platforms)
     # What is drawn of the dynamics does not depend on the builds.
     lag = {"natural_frequency": (20.0, 40.0), "machines": 4}
-    with_build = begun(task(randomisation={"build": {"size": (0.5, 1.0)}, **lag}), [0])
-    without = begun(task(randomisation=lag), [0])
+    with_build = begun(task(randomization={"build": {"size": (0.5, 1.0)}, **lag}), [0])
+    without = begun(task(randomization=lag), [0])
     pairs = zip(with_build.simulator.platforms, without.simulator.platforms, strict=True)
     assert all(a.hexapod.dynamics == b.hexapod.dynamics for a, b in pairs)
 
 
 @pytest.mark.parametrize("mode", ["acceleration", "jerk"])
 def test_gradients_through_two_machines_agree_with_finite_differences(mode):
-    batch = begun(task(mode, randomisation=RandomisationOptions(build=BUILD, machines=2)), [0, 1, 3])
+    batch = begun(task(mode, randomization=RandomizationOptions(build=BUILD, machines=2)), [0, 1, 3])
     assert len(set(batch.simulator.platform_of.tolist())) == 2
     found = gradient_that_agrees(TaskUnroll(batch, 8), LinearPolicy(batch.layout.size))
     told = batch.layout.slices["hexapod_top_speed"]

@@ -21,7 +21,7 @@ WEIGHTS = {"perceived_error": 0.3, "false_cues": 0.1, "tilt_rate": 0.5, "stroke"
 def batch(mode: str = "acceleration", felt: str = "machine", **options) -> Batch:
     """Three episodes under way, the machines somewhere in their travel."""
     task = TaskOptions(
-        observation={**SEEN, "felt": felt},
+        observation={**SEEN, "simulator_cue": felt},
         action={"mode": mode, "frame": "cab", "repeat": 3, "authority": 0.3},
         reward={"weights": WEIGHTS, "stroke_margin": 0.2},
         episode={"duration": 2.0, "random_start": True, "platform_offset": 0.3},
@@ -114,7 +114,7 @@ def test_gradients_through_policy_and_machine_agree_with_finite_differences(mode
 
 def test_gradients_where_actuators_lag_and_the_model_tells_what_is_felt():
     slow = {"natural_frequency": (30.0, 90.0), "dead_time": (0.0, 0.03)}
-    unroll = TaskUnroll(batch(felt="model", randomisation=slow), ACTIONS)
+    unroll = TaskUnroll(batch(felt="model", randomization=slow), ACTIONS)
     assert gradient_that_agrees(unroll, LinearPolicy(unroll.batch.layout.size)).any()
 
 

@@ -29,9 +29,16 @@ def trajectory(n: int = 201, dt: float = 0.05, **columns: Any) -> Trajectory:
         "step_time": np.full(n, np.nan),
         "limits": limits(),
     }
-    for name in ("f_wanted", "head_f_wanted", "f_felt", "head_f_felt", "sensed_f_wanted", "sensed_f_felt"):
+    for name in (
+        "f_reference",
+        "head_f_reference",
+        "f_simulator",
+        "head_f_simulator",
+        "perceived_f_reference",
+        "perceived_f_simulator",
+    ):
         values[name] = rest
-    for name in ("w_wanted", "w_felt", "sensed_w_wanted", "sensed_w_felt"):
+    for name in ("w_reference", "w_simulator", "perceived_w_reference", "perceived_w_simulator"):
         values[name] = np.zeros((n, 3))
     for name, width in (("carriage", 2), ("hexapod", 6), ("legs", 6)):
         values[name] = values[name + "_rate"] = np.zeros((n, width))
@@ -50,10 +57,10 @@ def drive(gain: float = 0.8, lag: float = 0.2, policy: str = "washout") -> Traje
         f = np.stack([0.5 * np.cos(0.4 * at), sway, np.full(n, -GRAVITY)], axis=1)
         return f, np.stack([0.03 * sway, 0.0 * sway, 0.08 * sway], axis=1)
 
-    f_wanted, w_wanted = motion(time)
+    f_reference, w_reference = motion(time)
     f_late, w_late = motion(time - lag)
     rest = np.array([0.0, 0.0, -GRAVITY])
-    f_felt = gain * (f_late - rest) + rest
+    f_simulator = gain * (f_late - rest) + rest
     wave = np.sin(2.0 * np.pi * 0.2 * time)
     active = np.zeros((n, 9), dtype=np.uint8)
     active[100:140, 1] = 1
@@ -62,16 +69,16 @@ def drive(gain: float = 0.8, lag: float = 0.2, policy: str = "washout") -> Traje
         dt,
         maneuver="weave",
         policy=policy,
-        f_wanted=f_wanted,
-        w_wanted=w_wanted,
-        head_f_wanted=f_wanted,
-        f_felt=f_felt,
-        w_felt=gain * w_late,
-        head_f_felt=f_felt,
-        sensed_f_wanted=f_wanted,
-        sensed_f_felt=f_felt,
-        sensed_w_wanted=w_wanted,
-        sensed_w_felt=gain * w_late,
+        f_reference=f_reference,
+        w_reference=w_reference,
+        head_f_reference=f_reference,
+        f_simulator=f_simulator,
+        w_simulator=gain * w_late,
+        head_f_simulator=f_simulator,
+        perceived_f_reference=f_reference,
+        perceived_f_simulator=f_simulator,
+        perceived_w_reference=w_reference,
+        perceived_w_simulator=gain * w_late,
         carriage=gain * np.outer(wave, [2.0, 9.0]),
         hexapod=gain * np.outer(wave, [0.1, 0.3, 0.0, 0.1, 0.02, 0.05]),
         legs=gain * np.outer(wave, [0.2, -0.3, 0.4, 0.5, -0.1, 0.3]),

@@ -210,7 +210,7 @@ def test_the_files_of_others_are_not_replaced(name, file, content, tmp_path, cap
     assert (tmp_path / file).read_text() == content
 
 
-def test_a_file_is_not_labelled_as_the_policy_that_ships():
+def test_a_file_is_not_labeled_as_the_policy_that_ships():
     names = ["my/classical-tuned.yaml", "classical-tuned", "your/classical-tuned.yml", "mine.yaml"]
     stems = [name.rpartition("/")[2].partition(".")[0] for name in names]
     assert list(labels(names, stems, policy_names()).values()) == [

@@ -56,7 +56,7 @@ def test_a_recording_is_what_happened(folder):
     assert np.array_equal(drive.force, cues.specific_force[:-1])
     assert np.array_equal(drive.velocity[:, 2:8], wanted.hexapod_rate[:-1])
     assert np.allclose(read(drive.observation, "carriage"), drive.position[:, :2], atol=1e-12)
-    assert np.allclose(read(drive.observation, "wanted_rate"), cues.angular_velocity[:-1], atol=1e-12)
+    assert np.allclose(read(drive.observation, "reference_rate"), cues.angular_velocity[:-1], atol=1e-12)
 
 
 def test_the_optimum_demonstrates(folder, tmp_path, capsys):

@@ -72,7 +72,7 @@ def test_dead_time_delays_what_is_felt_and_the_controller_does_not_know():
     felt = {}
     for name in ("nominal", "dead time"):
         one = found[name]
-        felt[name] = rollout(one.make("classical"), one.maneuvers["bend"](), one.platform).w_felt[:, 2]
+        felt[name] = rollout(one.make("classical"), one.maneuvers["bend"](), one.platform).w_simulator[:, 2]
     np.testing.assert_allclose(felt["dead time"][5:], felt["nominal"][:-5], atol=1e-9)
 
 

@@ -45,7 +45,7 @@ def test_a_washout_without_turntable_yaws_with_its_hexapod():
     yaw = []
     for fit in (policy_on, make_policy):
         machine = get_platform("paper-no-turntable")
-        felt = rollout(fit("classical", machine), bend(), machine).w_felt
+        felt = rollout(fit("classical", machine), bend(), machine).w_simulator
         yaw.append(np.abs(felt[:, 2]).max())
     assert yaw[0] > 0.05
     assert yaw[1] < 1e-3

@@ -221,7 +221,7 @@ def test_what_is_left_out_stands_below_the_table_and_one_drive_is_no_drives(tmp_
     assert ladder_table(alone).title == "The ladder, means over 1 drive"
 
 
-def test_bars_are_labelled_as_in_the_table():
+def test_bars_are_labeled_as_in_the_table():
     found = rungs(results_of(GAINS))
     small = [replace(r, standing=replace(r.standing, cue_error=3e-6)) for r in found[:1]] + found[1:]
     axes = new_figure(4.0, 3.0).subplots()

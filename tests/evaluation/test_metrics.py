@@ -21,7 +21,9 @@ def test_cue_error_is_the_headline_formula():
     rng = np.random.default_rng(1)
     f = REST + rng.normal(size=(201, 3))
     w = 0.1 * rng.normal(size=(201, 3))
-    metrics = measure(trajectory(f_felt=f, w_felt=w, sensed_f_felt=0.5 * f, sensed_w_felt=2.0 * w))
+    metrics = measure(
+        trajectory(f_simulator=f, w_simulator=w, perceived_f_simulator=0.5 * f, perceived_w_simulator=2.0 * w)
+    )
     expected = np.mean(np.sum((f - REST) ** 2, axis=1) / 0.6**2 + np.sum(w**2, axis=1) / np.radians(3.0) ** 2)
     sensed = np.mean(
         np.sum((0.5 * f - REST) ** 2, axis=1) / 0.6**2 + np.sum((2.0 * w) ** 2, axis=1) / np.radians(3.0) ** 2
@@ -39,7 +41,7 @@ def test_a_perfect_simulator_has_no_error():
     assert metrics.axes["f_y"].delay == pytest.approx(0.0, abs=1e-9)
 
 
-def test_no_motion_has_a_normalised_error_of_one_where_the_car_moves():
+def test_no_motion_has_a_normalized_error_of_one_where_the_car_moves():
     metrics = measure(drive(gain=0.0))
     for axis in ("f_x", "f_y", "w_z"):
         assert metrics.axes[axis].nrmse == pytest.approx(1.0)
@@ -47,7 +49,7 @@ def test_no_motion_has_a_normalised_error_of_one_where_the_car_moves():
         assert metrics.axes[axis].delay is None
     assert metrics.axes["f_z"].nrmse == 0.0
     assert metrics.tilt_rate_peak == 0.0
-    wanted = np.abs(drive().f_wanted[:, 1])
+    wanted = np.abs(drive().f_reference[:, 1])
     assert metrics.axes["f_y"].missing_cues == pytest.approx(np.mean(wanted > 0.17))
 
 
@@ -61,7 +63,7 @@ def test_gain_and_lag_show_in_error_and_delay():
 
 def test_parts_of_the_cue_error_add_up():
     still = measure(drive(gain=0.0)).axes["f_y"]
-    wanted = drive().f_wanted[:, 1]
+    wanted = drive().f_reference[:, 1]
     noticed = np.abs(wanted) > 0.17
     assert still.cue_error_false == 0.0
     assert still.cue_error_missing == pytest.approx(np.mean((wanted / 0.6) ** 2 * noticed))
@@ -73,7 +75,7 @@ def test_parts_of_the_cue_error_add_up():
 
 
 @pytest.mark.parametrize(
-    ("wanted", "felt", "expected"),
+    ("reference_cue", "simulator_cue", "expected"),
     [
         ((0.0, 0.0), (4.0, 0.0), 4.0),  # tilt coordination of a car that does not roll
         ((0.0, 0.0), (3.0, 4.0), 5.0),
@@ -88,14 +90,14 @@ def test_tilt_rate_is_what_the_car_did_not_ask_for(wanted, felt, expected):
     def rate(pair):
         return np.tile(np.radians([*pair, 9.0]), (201, 1))
 
-    metrics = measure(trajectory(w_wanted=rate(wanted), w_felt=rate(felt)))
+    metrics = measure(trajectory(w_reference=rate(wanted), w_simulator=rate(felt)))
     assert metrics.tilt_rate_peak == pytest.approx(radians(expected), abs=1e-12)
     assert metrics.tilt_rate_share == (1.0 if expected > 3.0 else 0.0)
 
 
 def test_tilt_at_exactly_the_limit_is_not_above_it():
     w = np.tile([radians(3.0) * (1 + 1e-12), 0.0, 0.0], (201, 1))
-    assert measure(trajectory(w_felt=w)).tilt_rate_share == 0.0
+    assert measure(trajectory(w_simulator=w)).tilt_rate_share == 0.0
 
 
 def test_vibration_is_of_the_specific_force_alone():
@@ -103,9 +105,9 @@ def test_vibration_is_of_the_specific_force_alone():
         return measure(trajectory(dt=0.01, **columns)).vibration
 
     shaking = np.outer(0.2 * np.sin(20.0 * np.pi * 0.01 * np.arange(201)), [0.0, 0.0, 1.0])
-    assert vibration(f_felt=REST + shaking) == pytest.approx(0.2 / np.sqrt(2.0), rel=0.03)
-    assert vibration(w_felt=shaking) == pytest.approx(0.0, abs=1e-9)
-    assert vibration(f_wanted=REST + shaking) == 0.0
+    assert vibration(f_simulator=REST + shaking) == pytest.approx(0.2 / np.sqrt(2.0), rel=0.03)
+    assert vibration(w_simulator=shaking) == pytest.approx(0.0, abs=1e-9)
+    assert vibration(f_reference=REST + shaking) == 0.0
 
 
 def test_strokes_are_shares_of_the_nearer_reached_limit():

@@ -29,7 +29,7 @@ def test_every_statement_passes(drives):
 def standing(drive: Trajectory) -> Trajectory:
     """The same drive on a machine that does not move."""
     rest = np.tile([0.0, 0.0, -9.81], (len(drive.time), 1))
-    return replace(drive, f_felt=rest, carriage=np.zeros_like(drive.carriage))
+    return replace(drive, f_simulator=rest, carriage=np.zeros_like(drive.carriage))
 
 
 def test_a_wrong_machine_would_fail(drives):

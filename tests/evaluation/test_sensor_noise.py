@@ -75,8 +75,8 @@ def test_the_noise_is_new_in_every_step_and_the_same_for_every_policy(kind):
     draws = np.random.default_rng(4)
     for k in range(n):
         wanted, felt = draws.normal(scale=0.2, size=(2, 1, 3))
-        np.testing.assert_allclose(read(found[k], "wanted_force"), wanted, atol=1e-12)
-        np.testing.assert_allclose(read(found[k], "felt_force"), felt, atol=1e-12)
+        np.testing.assert_allclose(read(found[k], "reference_force"), wanted, atol=1e-12)
+        np.testing.assert_allclose(read(found[k], "simulator_force"), felt, atol=1e-12)
         draws.normal(scale=0.03, size=(2, 1, 3))
     # A second drive has the noise of the first, and another policy has the same.
     np.testing.assert_allclose(found[n:], found[:n], atol=1e-12)
@@ -116,10 +116,10 @@ def test_noise_has_its_size_is_on_cues_alone_and_is_the_same_in_every_drive():
     np.testing.assert_array_equal(seers[0].seen[0], seers[1].seen[0])
     seen = seers[0].seen[0]
     for name, size in (
-        ("wanted_force", 0.2),
-        ("felt_force", 0.2),
-        ("wanted_rate", 0.03),
-        ("felt_rate", 0.03),
+        ("reference_force", 0.2),
+        ("simulator_force", 0.2),
+        ("reference_rate", 0.03),
+        ("simulator_rate", 0.03),
     ):
         assert np.std(read(seen, name)) == pytest.approx(size, rel=0.05)
     for name in ("carriage", "beta", "legs", "acceleration"):
@@ -161,8 +161,8 @@ def test_a_policy_that_is_told_the_drive_has_noisy_sensors_too():
 def test_what_a_model_tells_an_agent_has_no_noise_but_the_cars():
     agent = make_policy("learned-preview", PAPER)
     task = replace(agent.task, observation=replace(agent.task.observation, felt="model"))
-    modelled = Agent("modelled", task, agent.network, agent.record)
-    rows = with_noise(modelled, SensorNoise())._noisy(np.zeros((50, agent.layout.size)))
+    modeled = Agent("modeled", task, agent.network, agent.record)
+    rows = with_noise(modeled, SensorNoise())._noisy(np.zeros((50, agent.layout.size)))
     slices = agent.layout.slices
     for kind in ("force", "rate"):
         assert not rows[:, slices[f"felt_{kind}"]].any()

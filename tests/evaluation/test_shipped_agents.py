@@ -104,7 +104,7 @@ def test_late_actuators_change_nothing_of_what_it_asks_for(name):
     cues = get_maneuver("slalom").drive()
     at_once, late = (rollout(agent.on(platform), cues, platform) for platform in (paper, slow))
     np.testing.assert_allclose(late.action, at_once.action, rtol=0.0, atol=1e-3)
-    assert np.abs(late.f_felt - at_once.f_felt).max() > 0.1
+    assert np.abs(late.f_simulator - at_once.f_simulator).max() > 0.1
 
 
 def test_no_limit_of_the_machine_is_exceeded(driven):

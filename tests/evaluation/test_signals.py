@@ -70,14 +70,14 @@ def test_delay_is_undefined_without_a_peak_inside_the_search():
 
 
 @given(SIGNAL, st.floats(0.01, 1.0))
-def test_no_motion_has_a_normalised_error_of_one_or_less(wanted, floor):
-    error = signals.normalised_rmse(wanted, np.zeros_like(wanted), floor)
+def test_no_motion_has_a_normalized_error_of_one_or_less(wanted, floor):
+    error = signals.normalized_rmse(wanted, np.zeros_like(wanted), floor)
     strong = signals.rms(wanted) >= floor
     assert error == pytest.approx(1.0) if strong else error < 1.0
 
 
-def test_normalised_rmse_uses_the_floor_where_the_car_is_still():
-    assert signals.normalised_rmse(np.zeros(4), np.full(4, 0.5), 0.25) == pytest.approx(2.0)
+def test_normalized_rmse_uses_the_floor_where_the_car_is_still():
+    assert signals.normalized_rmse(np.zeros(4), np.full(4, 0.5), 0.25) == pytest.approx(2.0)
 
 
 def test_false_and_missing_cues_by_hand():

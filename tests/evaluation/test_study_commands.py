@@ -71,7 +71,7 @@ def test_robustness_writes_everything(cue_file, tmp_path, capsys):
     out = tmp_path / "out"
     argv = ["robustness", "--policies", "no-motion", "classical", "learned-preview"]
     argv += ["--maneuvers", str(cue_file)]
-    assert main([*argv, "--lag", "15", "--fierceness", "1.5", "--out", str(out)]) == 0
+    assert main([*argv, "--lag", "15", "--time-scaling", "1.5", "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     assert "18 of 18 drives driven now" in shown
     values = json.loads((out / "study.json").read_text())
@@ -96,7 +96,7 @@ def test_robustness_writes_everything(cue_file, tmp_path, capsys):
         (["compare", "--platforms", "papre"], "paper"),
         (["compare", "--policies", "classikal"], "classical"),
         (["compare", "--maneuvers", "none.csv"], "no such file"),
-        (["robustness", "--fierceness", "9"], "fierceness"),
+        (["robustness", "--time-scaling", "9"], "time_scaling"),
         (["robustness", "--lag", "0"], "lag"),
         (["robustness", "--other-car", "tank"], "unknown car"),
     ],

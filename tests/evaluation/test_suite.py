@@ -64,7 +64,7 @@ def test_a_drive_without_metrics_leaves_the_others():
     """A cue beyond all bounds makes a J that is no number; the other policies and maneuvers are reported."""
 
     def far(trace):
-        return replace(drive(), f_felt=np.full((len(drive().time), 3), 1e200))
+        return replace(drive(), f_simulator=np.full((len(drive().time), 3), 1e200))
 
     outcome = run_suite({"a": cues}, {"far": far, "good": lambda _: drive()}, finish=lambda *_: None)
     assert list(outcome.maneuvers["a"]) == ["good"]

@@ -17,10 +17,10 @@ from motion_cueing.envs.task import (
     ActionOptions,
     EpisodeOptions,
     ObservationOptions,
-    RandomisationOptions,
+    RandomizationOptions,
     TaskOptions,
 )
-from motion_cueing.envs.task.environment import normalised
+from motion_cueing.envs.task.environment import normalized
 from motion_cueing.envs.task.observation import acceleration_scale, layout_of
 from motion_cueing.evaluation import Trajectory, rollout
 
@@ -37,7 +37,7 @@ class InTask:
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         acceleration, state = self.inner.predict(observation[:, :OBSERVATION_SIZE], state, episode_start)
-        return normalised(acceleration, SCALE), state
+        return normalized(acceleration, SCALE), state
 
 
 class Still:
@@ -61,7 +61,9 @@ class Springs:
         calls, held = state or (0, None)
         if calls % self.hold == 0:
             held = np.zeros((1, 9))
-            held[:, :2] = 0.5 * read(observation, "wanted_force")[:, :2] - read(observation, "carriage_rate")
+            held[:, :2] = 0.5 * read(observation, "reference_force")[:, :2] - read(
+                observation, "carriage_rate"
+            )
         return held, (calls + 1, held)
 
 
@@ -126,13 +128,13 @@ def test_a_preview_shows_what_comes():
     seen = np.array(policy.seen)[:, rows].reshape(-1, 3, 6)
     assert len(seen) == len(cues) - 1
     for k, ahead in ((0, 50), (1, 100), (2, 150)):
-        truth = found.f_wanted[ahead:, :2] / 10.0
+        truth = found.f_reference[ahead:, :2] / 10.0
         assert np.allclose(seen[: len(truth) - 1, k, :2], truth[:-1], atol=1e-5)
 
 
 def test_nothing_is_random_whatever_it_was_trained_with():
     wild = TaskOptions(
-        randomisation=RandomisationOptions(
+        randomization=RandomizationOptions(
             actuator_gain=0.3, sensor_gain=0.3, force_noise=1.0, dead_time=(0.0, 0.1), machines=2
         ),
         episode=EpisodeOptions(

@@ -18,7 +18,7 @@ LATE = measure(drive(gain=0.9, lag=0.4))
 def push(y: float):
     """A car pushed by 1 m/s^2 to the right, the simulator by ``y``."""
     wanted, felt = np.tile([0.0, 1.0, -GRAVITY], (201, 1)), np.tile([0.0, y, -GRAVITY], (201, 1))
-    return measure(trajectory(f_wanted=wanted, f_felt=felt))
+    return measure(trajectory(f_reference=wanted, f_simulator=felt))
 
 
 def test_terms_add_up_to_the_cue_error():
@@ -46,8 +46,8 @@ def test_the_cause_is_what_the_other_does_wrong(worse, cause):
 def test_the_axis_on_which_the_best_is_worse_is_named():
     f = np.tile([0.0, 2.0, -GRAVITY], (201, 1))
     tilt = np.tile([0.07, 0.0, 0.0], (201, 1))
-    tilting = measure(trajectory(f_wanted=f, f_felt=f, w_felt=tilt))
-    still = measure(trajectory(f_wanted=f))
+    tilting = measure(trajectory(f_reference=f, f_simulator=f, w_simulator=tilt))
+    still = measure(trajectory(f_reference=f))
     why = judge("turn", {"no-motion": still, "tilting": tilting}).advantages[0]
     loss = (0.07 / np.radians(3.0)) ** 2
     gain = (2.0 / 0.6) ** 2
@@ -76,8 +76,8 @@ def test_an_advantage_is_never_negative():
 
 def test_the_perceived_best_is_named_where_it_differs():
     rest = np.tile([0.0, 0.0, -GRAVITY], (201, 1))
-    numb = measure(trajectory(f_wanted=rest, f_felt=rest, sensed_f_felt=rest + 1.0))
-    off = measure(trajectory(f_felt=rest + 0.1))
+    numb = measure(trajectory(f_reference=rest, f_simulator=rest, perceived_f_simulator=rest + 1.0))
+    off = measure(trajectory(f_simulator=rest + 0.1))
     verdict = judge("rest", {"numb": numb, "off": off})
     assert (verdict.best, verdict.perceived_best) == ("numb", "off")
     assert verdict.sentences[-1] == "By the perceived J, off is best."

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines.mpc import Margins
-from motion_cueing.baselines.mpc.prediction import N_CUES, Linearised, cue_scales
+from motion_cueing.baselines.mpc.prediction import N_CUES, Linearized, cue_scales
 from motion_cueing.baselines.mpc.problem import moving_axes
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import get_platform
@@ -41,7 +41,7 @@ def moved(actions: np.ndarray, last: np.ndarray) -> Simulator:
 def felt(simulator: Simulator) -> np.ndarray:
     """(n, 6) cues at the cab."""
     state = simulator.state
-    return np.hstack([state["felt"]["force"], state["felt"]["rate"]])
+    return np.hstack([state["simulator_cue"]["force"], state["simulator_cue"]["rate"]])
 
 
 def test_slopes_are_differences_of_the_kernel():
@@ -52,7 +52,7 @@ def test_slopes_are_differences_of_the_kernel():
     base[10:] -= PUSH * np.eye(9)
     simulator = moved(actions[:-1], base)
     q, v, a = row_of(simulator, 0)
-    linear = Linearised(PAPER, 1, Margins(), compile=False)(q[None], v[None], a[None])
+    linear = Linearized(PAPER, 1, Margins(), compile=False)(q[None], v[None], a[None])
     cues = felt(simulator) / cue_scales()
     assert np.abs(linear.values[0, :N_CUES] - cues[0]).max() < 1e-9
     measured = (cues[1:10] - cues[10:]) / (2.0 * PUSH)  # (9, 6)
@@ -66,26 +66,26 @@ def test_limit_rows_are_shares_of_the_actuators_limits():
     simulator = moved(rng.normal(size=(30, 9)), rng.normal(size=(1, 9)))
     q, v, a = row_of(simulator, 0)
     margins = Margins(position=1.0, rate=1.0, acceleration=1.0, braking=1.0)
-    linearised = Linearised(PAPER, 1, margins, compile=False)
-    rows = linearised(q[None], v[None], a[None]).values[0, N_CUES:]
+    linearized = Linearized(PAPER, 1, margins, compile=False)
+    rows = linearized(q[None], v[None], a[None]).values[0, N_CUES:]
     motion, limits = simulator.state[0]["motion"], simulator.machines.numpy()[0]
     place, rate = motion["position"], motion["rate"]
     stop = place + rate * np.abs(rate) / (2.0 * limits["acceleration"])
     assert np.abs(rows[:8] - (stop / limits["position_max"])[:8]).max() < 1e-9
     assert np.abs(rows[8:17] - rate / limits["velocity"]).max() < 1e-9
-    assert np.all(linearised.upper == 1.0)
-    assert np.all(linearised.lower == -1.0)
+    assert np.all(linearized.upper == 1.0)
+    assert np.all(linearized.lower == -1.0)
 
 
 def test_slopes_are_differences_of_the_rows():
     rng = np.random.default_rng(6)
-    linearised = Linearised(PAPER, 1, Margins(), compile=False)
+    linearized = Linearized(PAPER, 1, Margins(), compile=False)
     x = 0.1 * rng.normal(size=27)
-    slopes = linearised(*x.reshape(3, 1, 9)).slopes[0].copy()
+    slopes = linearized(*x.reshape(3, 1, 9)).slopes[0].copy()
     h = 1e-6
     for i in range(27):
         ends = [
-            linearised(*(x + sign * h * np.eye(27)[i]).reshape(3, 1, 9)).values[0].copy()
+            linearized(*(x + sign * h * np.eye(27)[i]).reshape(3, 1, 9)).values[0].copy()
             for sign in (1.0, -1.0)
         ]
         assert np.abs((ends[0] - ends[1]) / (2.0 * h) - slopes[:, i]).max() < 1e-5
@@ -98,4 +98,4 @@ def test_slopes_are_differences_of_the_rows():
 def test_a_missing_subsystem_has_no_rows_and_does_not_move(name, axes, rows):
     platform = get_platform(name)
     assert len(moving_axes(platform)) == axes
-    assert len(Linearised(platform, 1, Margins(), compile=False).upper) == rows
+    assert len(Linearized(platform, 1, Margins(), compile=False).upper) == rows

@@ -9,7 +9,7 @@ import pytest
 from motion_cueing.baselines import symbolic as compiled_module
 from motion_cueing.baselines.mpc import Margins, NmpcParameters, make_nmpc
 from motion_cueing.baselines.mpc import solver as planner_module
-from motion_cueing.baselines.mpc.prediction import N_CUES, Linearised
+from motion_cueing.baselines.mpc.prediction import N_CUES, Linearized
 from motion_cueing.baselines.mpc.solver import Planned, Planner
 from motion_cueing.baselines.symbolic import compiled
 from motion_cueing.envs.maneuvers import get_maneuver
@@ -36,11 +36,11 @@ def test_a_converged_plan_keeps_the_exact_limits():
     planned, _ = plan(50, tolerance=5e-3)
     assert planned.solved
     assert planned.converged
-    linearised = Linearised(PAPER, len(NODES), Margins(), compile=False)
-    exact = linearised(planned.plan.position, planned.plan.rate, planned.plan.acceleration)
+    linearized = Linearized(PAPER, len(NODES), Margins(), compile=False)
+    exact = linearized(planned.plan.position, planned.plan.rate, planned.plan.acceleration)
     limits = exact.values[:, N_CUES:]
-    assert np.all(limits <= linearised.upper + 1e-4)
-    assert np.all(limits >= linearised.lower - 1e-4)
+    assert np.all(limits <= linearized.upper + 1e-4)
+    assert np.all(limits >= linearized.lower - 1e-4)
     assert np.any(np.abs(limits) > 0.9)  # it is near some
 
 
@@ -141,6 +141,6 @@ def test_without_a_compiler_the_function_stays_as_it_is(cache, monkeypatch, comm
 
 def test_compiled_derivatives_are_those_of_the_symbols(cache):
     x = 0.1 * np.random.default_rng(1).normal(size=(3, 2, 9))
-    found = [Linearised(PAPER, 2, Margins(), compile=compile)(*x) for compile in (False, True)]
+    found = [Linearized(PAPER, 2, Margins(), compile=compile)(*x) for compile in (False, True)]
     assert np.allclose(found[0].slopes, found[1].slopes, rtol=0.0, atol=1e-12)
     assert np.allclose(found[0].values, found[1].values, rtol=0.0, atol=1e-12)

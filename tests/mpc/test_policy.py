@@ -136,7 +136,7 @@ def test_the_turntable_goes_round_and_round():
     trajectory = driven(cues, preview=1.0, every=10)
     assert trajectory.turntable[-1] > 2.0 * np.pi
     assert np.abs(np.diff(trajectory.turntable_rate[300:])).max() < 0.01
-    assert trajectory.w_felt[-1, 2] == pytest.approx(0.6, abs=0.02)
+    assert trajectory.w_simulator[-1, 2] == pytest.approx(0.6, abs=0.02)
 
 
 def test_no_plan_means_braking_to_a_stop_within_limits(monkeypatch):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from motion_cueing.baselines.mpc import solver as solver_module
-from motion_cueing.baselines.mpc.prediction import N_CUES, Linearisation, cue_scales, make_grid
+from motion_cueing.baselines.mpc.prediction import N_CUES, Linearization, cue_scales, make_grid
 from motion_cueing.baselines.mpc.problem import Bounds, Plan, Problem
 from motion_cueing.baselines.mpc.solver import Solution, solve
 
@@ -27,10 +27,10 @@ class Case:
         rng = np.random.default_rng(seed)
         self.grid = make_grid(NODES)
         self.problem = Problem(PAPER, quick(nodes=NODES), self.grid)
-        self.about = Linearisation(rng.normal(size=(N, K)), rng.normal(size=(N, K, 27)))
+        self.about = Linearization(rng.normal(size=(N, K)), rng.normal(size=(N, K, 27)))
         self.plan = Plan(*(rng.normal(size=(N, 9)) for _ in range(3)))
-        self.wanted = rng.normal(size=(N, 6))
-        self.cost = self.problem.cost(self.plan, self.about, self.wanted, None)
+        self.reference_cue = rng.normal(size=(N, 6))
+        self.cost = self.problem.cost(self.plan, self.about, self.reference_cue, None)
         self.bounds = bounds_of(width, price)
         # All rows as they depend on the unknowns, node by node, by hand.
         at = np.zeros((N, K, N, 9))
@@ -62,7 +62,7 @@ def test_without_limits_it_is_least_squares():
     solution = case.solve()
     weights = np.sqrt(np.repeat(case.grid.weights, N_CUES))
     cues = case.rows.reshape(N, K, -1)[:, :N_CUES].reshape(N * N_CUES, -1)
-    error = (case.about.values[:, :N_CUES] - case.wanted / cue_scales()).ravel()
+    error = (case.about.values[:, :N_CUES] - case.reference_cue / cue_scales()).ravel()
     blocks, targets = [weights[:, None] * cues], [-weights * error]
     for axis, terms in enumerate(case.problem.motion_weights):
         pick = np.eye(9)[axis]

@@ -35,8 +35,8 @@ def test_a_surge_within_the_travel_is_felt_as_it_is():
     record = rollout(Optimum(options=COARSE), drive)
     assert measure(record).cue_error < 1e-4
     omega = 2.0 * np.pi / 3.0
-    travelled = 2.0 / omega * (record.time - np.sin(omega * record.time) / omega)
-    assert np.abs(record.carriage[:, 0] + record.hexapod[:, 0] - travelled).max() < 0.05
+    traveled = 2.0 / omega * (record.time - np.sin(omega * record.time) / omega)
+    assert np.abs(record.carriage[:, 0] + record.hexapod[:, 0] - traveled).max() < 0.05
 
 
 def test_the_plan_gives_what_it_claims_and_meets_no_limit(braking):
@@ -77,8 +77,8 @@ def costs_with(drive: CueTrace, accelerations: np.ndarray) -> tuple[np.ndarray, 
     costs, kept = np.zeros(len(accelerations)), np.ones(len(accelerations), dtype=bool)
     for k in range(accelerations.shape[1]):
         state = simulator.step(accelerations[:, k])
-        force = (state["felt"]["force"] - state["wanted"]["force"]) / 0.6
-        rate = (state["felt"]["rate"] - state["wanted"]["rate"]) / np.radians(3.0)
+        force = (state["simulator_cue"]["force"] - state["reference_cue"]["force"]) / 0.6
+        rate = (state["simulator_cue"]["rate"] - state["reference_cue"]["rate"]) / np.radians(3.0)
         costs += np.sum(force**2, axis=1) + np.sum(rate**2, axis=1)
         kept &= state["limits"] == 0
     return costs, kept

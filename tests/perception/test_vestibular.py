@@ -9,7 +9,7 @@ from scipy import signal
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.envs.perception import get_vestibular_model, vestibular_model_names
-from motion_cueing.envs.perception.models import discretise
+from motion_cueing.envs.perception.models import discretize
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import from_dict, to_dict
 from motion_cueing.envs.simulator.simulator import Simulator
@@ -45,8 +45,8 @@ def perceive(model: str, drive: CueTrace) -> tuple[np.ndarray, np.ndarray, np.nd
     rows = [batch.reset()[0].copy()]
     rows += [batch.step(np.zeros(9))[0].copy() for _ in range(len(drive) - 1)]
     record = np.array(rows)
-    sensed = record["sensed_wanted"]
-    return record["wanted"]["head_force"], sensed["force"], sensed["rate"]
+    sensed = record["perceived_reference"]
+    return record["reference_cue"]["head_force"], sensed["force"], sensed["rate"]
 
 
 def respond(transfer, values: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_discrete_filters_rest_where_a_constant_input_leaves_them(model):
         (filters.otoliths.transfer_function(), 1.0),
         (filters.canals.transfer_function(2), 0.0),
     ]:
-        discrete = discretise(*transfer, DT)
+        discrete = discretize(*transfer, DT)
         x = discrete.rest
         np.testing.assert_allclose(discrete.a @ x + discrete.b, x, atol=1e-9 * np.abs(x).max())
         assert discrete.c @ x + discrete.d == pytest.approx(gain, abs=1e-9)

@@ -37,7 +37,7 @@ def smooth_commands(n: int, steps: int, seed: int) -> np.ndarray:
     return amplitude * np.cos(frequency * time)
 
 
-def coloured_noise(n: int, steps: int, scale: float, seed: int) -> np.ndarray:
+def colored_noise(n: int, steps: int, scale: float, seed: int) -> np.ndarray:
     """Accelerations (steps, n, 9) that wander, with a memory of a third of a second."""
     rng = np.random.default_rng(seed)
     actions = rng.normal(size=(steps, n, 9)) * 0.3 * scale
@@ -74,13 +74,13 @@ def test_gentle_drives_agree_with_lag_and_dead_time(name):
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.parametrize("scale", [1.0, 10.0])
 def test_violent_drives_agree_step_by_step(name, scale):
-    actions = coloured_noise(8, 300, scale, seed=3)
+    actions = colored_noise(8, 300, scale, seed=3)
     field, value = worst(PRESETS[name], actions, free=False)
     assert value < AGREE, field
 
 
 def test_violent_drives_agree_step_by_step_for_2000_steps():
-    field, value = worst(PRESETS["paper"], coloured_noise(1, 2000, 3.0, seed=4), free=False)
+    field, value = worst(PRESETS["paper"], colored_noise(1, 2000, 3.0, seed=4), free=False)
     assert value < AGREE, field
 
 
@@ -100,7 +100,7 @@ def test_steps_that_brake_before_a_singular_pose_agree():
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_violent_drives_agree_with_lag_and_dead_time(name):
-    field, value = worst(sluggish(PRESETS[name]), coloured_noise(4, 150, 3.0, seed=5), free=True)
+    field, value = worst(sluggish(PRESETS[name]), colored_noise(4, 150, 3.0, seed=5), free=True)
     assert value < AGREE, field
 
 

@@ -13,12 +13,12 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import Platform
 from motion_cueing.envs.platform.kinematics import legs_of_pose, pose_of_legs
 from motion_cueing.envs.platform.parameters import axis_reach, machine_parameters
-from motion_cueing.envs.platform.randomization import BuildRanges, drawn_machine, resized
+from motion_cueing.envs.platform.randomization import PlatformRanges, random_platform, resized
 
 from .machines_under_test import DT, PRESETS
 
 PAPER = PRESETS["paper"]
-WIDE = BuildRanges(
+WIDE = PlatformRanges(
     travel=(0.3, 1.2),
     size=(0.3, 1.2),
     shape=(0.8, 1.25),
@@ -29,8 +29,8 @@ WIDE = BuildRanges(
 )
 
 
-def drawn(ranges: BuildRanges, seed: int = 0, platform: Platform = PAPER) -> Platform:
-    return drawn_machine(platform, ranges, np.random.default_rng(seed), "drawn")
+def drawn(ranges: PlatformRanges, seed: int = 0, platform: Platform = PAPER) -> Platform:
+    return random_platform(platform, ranges, np.random.default_rng(seed), "drawn")
 
 
 def clearance(hexapod, pose: np.ndarray) -> float:
@@ -110,7 +110,7 @@ def test_every_drawn_machine_closes_at_neutral_and_moves(seed, name):
 
 def test_shares_of_subsystems_are_those_asked_for():
     rng, count = np.random.default_rng(3), 1000
-    machines = [drawn_machine(PAPER, WIDE, rng, "drawn") for _ in range(count)]
+    machines = [random_platform(PAPER, WIDE, rng, "drawn") for _ in range(count)]
     tables = [machine.turntable for machine in machines if machine.turntable]
     limited = [table.travel for table in tables if table.travel]
     for found, share, among in (
@@ -123,7 +123,7 @@ def test_shares_of_subsystems_are_those_asked_for():
 
 
 def test_without_ranges_only_the_name_differs():
-    made = drawn(BuildRanges())
+    made = drawn(PlatformRanges())
     np.testing.assert_allclose(made.hexapod.upper_joints, PAPER.hexapod.upper_joints, atol=1e-12)
     np.testing.assert_allclose(made.hexapod.neutral, PAPER.hexapod.neutral, atol=1e-12)
     assert made.carriage == PAPER.carriage
@@ -133,9 +133,11 @@ def test_without_ranges_only_the_name_differs():
 
 def test_machines_that_never_close_are_refused():
     with pytest.raises(ConfigurationError, match=r"none of 100 machines drawn around 'paper' closes.*narrow"):
-        drawn(BuildRanges(travel=(9.0, 10.0)))
+        drawn(PlatformRanges(travel=(9.0, 10.0)))
     # Some of these close, and are found.
-    assert drawn(BuildRanges(travel=(1.0, 10.0))).hexapod.extension[1] < PAPER.hexapod.neutral_lengths.min()
+    assert (
+        drawn(PlatformRanges(travel=(1.0, 10.0))).hexapod.extension[1] < PAPER.hexapod.neutral_lengths.min()
+    )
 
 
 def test_ranges_run_from_low_to_high():

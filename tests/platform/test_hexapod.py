@@ -69,7 +69,7 @@ def test_determinant_is_that_of_the_whole_jacobian(platform):
     found = leg_rows(platform.hexapod, poses(platform), DIRECTION)
     whole = np.concatenate([found["u"], found["w"]], axis=2)
     np.testing.assert_allclose(found["determinant"], np.linalg.det(whole), rtol=1e-10)
-    _, reference = plain.linearise(MachineModel.of(platform), poses(platform))
+    _, reference = plain.linearize(MachineModel.of(platform), poses(platform))
     np.testing.assert_allclose(whole, reference, atol=1e-14)
 
 

@@ -47,10 +47,13 @@ def differences(kernel: Rows, reference: ReferenceState) -> dict[str, float]:
         found = motion_of(kernel[name])
         for field in ("position", "rate", "pose", "pose_rate"):
             pairs[f"{name}.{field}"] = getattr(found, field), getattr(motion, field)
-    for name, cues in (("wanted", reference.wanted), ("felt", reference.felt)):
+    for name, cues in (
+        ("reference_cue", reference.reference_cue),
+        ("simulator_cue", reference.simulator_cue),
+    ):
         for field, values in zip(CUES, cues, strict=True):
             pairs[f"{name}.{field}"] = kernel[name][field], values
-    for name in ("sensed_wanted", "sensed_felt"):
+    for name in ("perceived_reference", "perceived_simulator"):
         sensed = np.concatenate([kernel[name]["force"], kernel[name]["rate"]], axis=1)
         pairs[name] = sensed, getattr(reference, name)
     assert np.array_equal(kernel["sample"], reference.sample)

@@ -11,7 +11,7 @@ from .setpoint import MotionState
 GRAVITY = np.array([0.0, 0.0, 9.81])
 
 
-def felt_cues(machine: MachineModel, motion: MotionState, axes: Floats) -> tuple[Floats, Floats, Floats]:
+def simulator_cues(machine: MachineModel, motion: MotionState, axes: Floats) -> tuple[Floats, Floats, Floats]:
     """Specific force at the cab's reference point, angular velocity, and specific force at the head, in F_S.
 
     ``axes`` (n, 9) are the accelerations of the nine axes.

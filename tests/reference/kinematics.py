@@ -12,7 +12,7 @@ CONVERGED = 1e-13  # m
 CLOSED = 1e-9  # m
 
 
-def linearise(machine: MachineModel, pose: Floats) -> tuple[Floats, Floats]:
+def linearize(machine: MachineModel, pose: Floats) -> tuple[Floats, Floats]:
     """Extensions (n, 6) by Eqs. (12), (13), and their Jacobian (n, 6, 6) for [sdot, omega_HI]."""
     turned = machine.upper @ np.swapaxes(rotation(pose[:, 3:]), 1, 2)
     legs = turned - machine.lower + (machine.neutral + pose[:, None, :3])
@@ -25,7 +25,7 @@ def linearise(machine: MachineModel, pose: Floats) -> tuple[Floats, Floats]:
 
 def extensions(machine: MachineModel, pose: Floats) -> Floats:
     """Eq. (13), (n, 6), m."""
-    return linearise(machine, pose)[0]
+    return linearize(machine, pose)[0]
 
 
 def to_pose_rates(twist: Floats, beta: Floats) -> Floats:
@@ -37,7 +37,7 @@ def to_pose_rates(twist: Floats, beta: Floats) -> Floats:
 
 def clearance(machine: MachineModel, pose: Floats) -> Floats:
     """(n,) det J over its value at neutral; 0 in a singular pose."""
-    return np.asarray(np.linalg.det(linearise(machine, pose)[1]) / machine.neutral_determinant)
+    return np.asarray(np.linalg.det(linearize(machine, pose)[1]) / machine.neutral_determinant)
 
 
 def forward_kinematics(machine: MachineModel, legs: Floats, guess: Floats) -> tuple[Floats, np.ndarray]:
@@ -46,7 +46,7 @@ def forward_kinematics(machine: MachineModel, legs: Floats, guess: Floats) -> tu
     closed = np.zeros(len(pose), dtype=bool)
     rows = np.arange(len(pose))
     for iteration in range(ITERATIONS + 1):
-        lengths, twist = linearise(machine, pose[rows])
+        lengths, twist = linearize(machine, pose[rows])
         error = legs[rows] - lengths
         largest = np.abs(error).max(axis=1)
         closed[rows] = largest <= CLOSED
@@ -61,11 +61,11 @@ def forward_kinematics(machine: MachineModel, legs: Floats, guess: Floats) -> tu
 
 def pose_rates(machine: MachineModel, pose: Floats, leg_rates: Floats) -> Floats:
     """[sdot, betadot] (n, 6) of leg rates (n, 6)."""
-    matrix = to_pose_rates(linearise(machine, pose)[1], pose[:, 3:])
+    matrix = to_pose_rates(linearize(machine, pose)[1], pose[:, 3:])
     return np.asarray(np.linalg.solve(matrix, leg_rates[..., None])[..., 0])
 
 
 def legs_of(machine: MachineModel, pose: Floats, rates: Floats) -> tuple[Floats, Floats]:
     """Extensions and their rates (n, 6) of a pose and its rates [sdot, betadot] (n, 6)."""
-    lengths, twist = linearise(machine, pose)
+    lengths, twist = linearize(machine, pose)
     return lengths, apply(to_pose_rates(twist, pose[:, 3:]), rates)

@@ -12,7 +12,7 @@ from motion_cueing.envs.perception import VestibularModel, get_vestibular_model
 from motion_cueing.envs.platform import Platform
 
 from .actuators import dead_steps, lag
-from .cues import felt_cues
+from .cues import simulator_cues
 from .frames import Floats
 from .kinematics import extensions, forward_kinematics, pose_rates
 from .machine import MachineModel
@@ -30,12 +30,12 @@ class ReferenceState:
     setpoint: MotionState
     motion: MotionState
     acceleration: Floats
-    wanted: tuple[Floats, Floats, Floats]
-    felt: tuple[Floats, Floats, Floats]
+    reference: tuple[Floats, Floats, Floats]
+    simulated: tuple[Floats, Floats, Floats]
     modes_wanted: Floats
     modes_felt: Floats
-    sensed_wanted: Floats
-    sensed_felt: Floats
+    perceived_reference: Floats
+    perceived_simulator: Floats
 
 
 class ReferenceSimulator:
@@ -64,15 +64,20 @@ class ReferenceSimulator:
         position = np.concatenate([start[:, :2], legs, start[:, 8:]], axis=1)
         motion = MotionState(position, np.zeros((self.n, 9)), start[:, 2:8].copy(), np.zeros((self.n, 6)))
         sample = np.zeros(self.n, dtype=int)
-        wanted, felt = self.wanted(sample), felt_cues(self.machine, motion, np.zeros((self.n, 9)))
-        modes = [self.perception.rest(heard(cues)) for cues in (wanted, felt)]
-        sensed = [self.perception.sensed(m, heard(c)) for m, c in zip(modes, (wanted, felt), strict=True)]
+        reference, simulated = (
+            self.reference_cue(sample),
+            simulator_cues(self.machine, motion, np.zeros((self.n, 9))),
+        )
+        modes = [self.perception.rest(heard(cues)) for cues in (reference, simulated)]
+        sensed = [
+            self.perception.sensed(m, heard(c)) for m, c in zip(modes, (reference, simulated), strict=True)
+        ]
         still = np.zeros((self.n, 9))
-        self.state = ReferenceState(sample, motion, motion, still, wanted, felt, *modes, *sensed)
+        self.state = ReferenceState(sample, motion, motion, still, reference, simulated, *modes, *sensed)
         self.history = deque([motion] * (2 + max(self.dead)), maxlen=2 + max(self.dead))
         return self.state
 
-    def wanted(self, sample: np.ndarray) -> tuple[Floats, Floats, Floats]:
+    def reference(self, sample: np.ndarray) -> tuple[Floats, Floats, Floats]:
         """The car's cues at these samples; its last ones after the end."""
         index = np.minimum(sample, len(self.drive[0]) - 1)
         force, rate, head = (channel[index] for channel in self.drive)
@@ -86,15 +91,17 @@ class ReferenceSimulator:
         motion = setpoint if self.unity else self.actuate(old.motion)
         acceleration = (motion.axis_rates() - old.motion.axis_rates()) / self.dt
         sample = old.sample + 1
-        wanted, felt = self.wanted(sample), felt_cues(self.machine, motion, acceleration)
+        reference, simulated = self.reference_cue(sample), simulator_cues(self.machine, motion, acceleration)
         modes, sensed = [], []
         for begin, before, after in (
-            (old.modes_wanted, old.wanted, wanted),
-            (old.modes_felt, old.felt, felt),
+            (old.modes_wanted, old.reference_cue, reference),
+            (old.modes_felt, old.simulator_cue, simulated),
         ):
             modes.append(self.perception.advance(begin, heard(before), heard(after)))
             sensed.append(self.perception.sensed(modes[-1], heard(after)))
-        self.state = ReferenceState(sample, setpoint, motion, acceleration, wanted, felt, *modes, *sensed)
+        self.state = ReferenceState(
+            sample, setpoint, motion, acceleration, reference, simulated, *modes, *sensed
+        )
         return self.state
 
     def actuate(self, true: MotionState) -> MotionState:

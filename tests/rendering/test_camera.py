@@ -27,8 +27,8 @@ def matrix_of(camera: Camera) -> np.ndarray:
     tip = np.array([[np.cos(fall), 0.0, np.sin(fall)], [0.0, 1.0, 0.0], [-np.sin(fall), 0.0, np.cos(fall)]])
     forward_right_down = tip @ turn
     rotation = forward_right_down[[1, 2, 0]]
-    intrinsic = np.array([[camera.focal, 0.0, camera.centre[0]],
-                          [0.0, camera.focal, camera.centre[1]], [0.0, 0.0, 1.0]])  # fmt: skip
+    intrinsic = np.array([[camera.focal, 0.0, camera.center[0]],
+                          [0.0, camera.focal, camera.center[1]], [0.0, 0.0, 1.0]])  # fmt: skip
     return intrinsic @ np.column_stack([rotation, -rotation @ camera.position])
 
 
@@ -50,10 +50,10 @@ def test_drawn_joints_project_like_the_matrix():
 
 
 def test_the_target_is_in_the_middle_and_up_is_up():
-    np.testing.assert_allclose(CAMERA.project(CAMERA.target), CAMERA.centre)
+    np.testing.assert_allclose(CAMERA.project(CAMERA.target), CAMERA.center)
     above = CAMERA.project(CAMERA.target - [0.0, 0.0, 1.0])
-    assert above[1] < CAMERA.centre[1]
-    assert abs(above[0] - CAMERA.centre[0]) < 1e-9
+    assert above[1] < CAMERA.center[1]
+    assert abs(above[0] - CAMERA.center[0]) < 1e-9
 
 
 def test_seen_from_behind_right_is_right():

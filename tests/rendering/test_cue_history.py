@@ -24,8 +24,8 @@ def test_the_last_seconds_are_kept_in_order(samples, window):
         history.append(k * DT, row[:6], row[6:])
     kept = len(history)
     assert kept == min(samples, int(np.ceil(window / DT)) + 1)
-    np.testing.assert_array_equal(history.wanted, rows[samples - kept :, :6])
-    np.testing.assert_array_equal(history.felt, rows[samples - kept :, 6:])
+    np.testing.assert_array_equal(history.reference_cue, rows[samples - kept :, :6])
+    np.testing.assert_array_equal(history.simulator_cue, rows[samples - kept :, 6:])
     np.testing.assert_allclose(history.times, DT * np.arange(samples - kept, samples))
     assert history.time == (samples - 1) * DT if samples else history.time == 0.0
 
@@ -45,7 +45,7 @@ def test_clear_begins_anew():
     assert (len(history), history.time, history.cue_error) == (0, 0.0, 0.0)
     assert not history.peak.any()
     history.append(0.0, np.zeros(6), np.zeros(6))
-    assert len(history.wanted) == 1
+    assert len(history.reference_cue) == 1
 
 
 def test_what_is_no_sample_is_refused():
@@ -59,4 +59,4 @@ def test_what_is_no_sample_is_refused():
     with pytest.raises(ConfigurationError, match="dt"):
         CueHistory("m", "p", 0.0)
     with pytest.raises(ValueError, match="read-only"):
-        history.wanted[0] = 1.0
+        history.reference_cue[0] = 1.0

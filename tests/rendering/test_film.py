@@ -119,7 +119,7 @@ def test_what_is_no_film_is_refused(tmp_path):
         save_film(tmp_path / "a.gif", [], 10.0)
 
 
-@pytest.mark.parametrize("wanted", [1.0, 12.5, 15.0, 30.0, 100.0])
+@pytest.mark.parametrize("reference_cue", [1.0, 12.5, 15.0, 30.0, 100.0])
 def test_a_gif_lasts_whole_hundredths_and_no_less_than_two(wanted):
     hundredths = 100.0 / gif_rate(wanted)
     assert hundredths == pytest.approx(round(hundredths))

@@ -96,8 +96,8 @@ def test_faces_towards_the_lamp_are_brighter_and_never_black():
 
 
 def test_use_is_green_then_amber_then_red():
-    green, amber, red = (theme.colour_of_use(use) for use in (0.2, -0.8, 1.7))
-    assert green == theme.colour_of_use(0.0)
+    green, amber, red = (theme.color_of_use(use) for use in (0.2, -0.8, 1.7))
+    assert green == theme.color_of_use(0.0)
     assert green[1] > green[0]
     assert amber[0] > amber[1] > amber[2]
     assert red[0] > 2 * red[1]

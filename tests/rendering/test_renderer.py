@@ -39,9 +39,9 @@ def changed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.any(a != b, axis=-1)
 
 
-def near(frame: np.ndarray, colour: tuple[int, int, int], tolerance: int = 30) -> np.ndarray:
-    """Rows and columns of pixels close to a colour."""
-    return np.argwhere(np.abs(frame.astype(int) - colour).max(axis=-1) < tolerance)
+def near(frame: np.ndarray, color: tuple[int, int, int], tolerance: int = 30) -> np.ndarray:
+    """Rows and columns of pixels close to a color."""
+    return np.argwhere(np.abs(frame.astype(int) - color).max(axis=-1) < tolerance)
 
 
 @pytest.mark.parametrize("name", platform_names())
@@ -86,7 +86,7 @@ def test_cues_show_in_the_charts_and_as_arrows(renderer):
 
 def test_a_frame_without_any_cue_yet(renderer):
     empty = CueHistory("m", "p", 0.01)
-    assert not len(near(renderer.frame(moment(PAPER), empty)[:, :STAGE], theme.FELT))
+    assert not len(near(renderer.frame(moment(PAPER), empty)[:, :STAGE], theme.SIMULATOR))
 
 
 def test_the_arrow_of_a_car_at_rest_points_straight_up_from_the_head(renderer):
@@ -94,7 +94,7 @@ def test_the_arrow_of_a_car_at_rest_points_straight_up_from_the_head(renderer):
     rest = np.array([0.0, 0.0, -9.81, 0.0, 0.0, 0.0])
     history.append(0.0, rest, rest)
     motion = moment(PAPER)
-    arrow = near(renderer.frame(motion, history)[:, :STAGE], theme.FELT)
+    arrow = near(renderer.frame(motion, history)[:, :STAGE], theme.SIMULATOR)
     camera = Scene(PAPER, load("pygame", "pygame-ce")).camera(motion, STAGE, SIZE[1])
     column, row = camera.project(head(PAPER, motion))
     assert np.abs(arrow[:, 1] - column).max() < 6.0
@@ -115,8 +115,8 @@ def test_a_turn_to_the_right_moves_the_felt_arrow_to_the_right_of_the_cab():
 def test_a_leg_at_its_end_is_red(renderer, cues):
     rest = moment(PAPER)
     ends = replace(rest, legs=np.full(6, PAPER.hexapod.extension[1]))
-    assert not len(near(renderer.frame(rest, cues)[:, :STAGE], theme.colour_of_use(1.0), 20))
-    assert len(near(renderer.frame(ends, cues)[:, :STAGE], theme.colour_of_use(1.0), 20)) > 50
+    assert not len(near(renderer.frame(rest, cues)[:, :STAGE], theme.color_of_use(1.0), 20))
+    assert len(near(renderer.frame(ends, cues)[:, :STAGE], theme.color_of_use(1.0), 20)) > 50
 
 
 def test_the_machine_stays_in_the_picture_wherever_it_goes(renderer):

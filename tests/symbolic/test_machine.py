@@ -15,7 +15,7 @@ from motion_cueing.envs.platform import actuator_limits
 from motion_cueing.envs.simulator.simulator import Simulator
 
 from ..platform.machines_under_test import PRESETS
-from ..reference.cues import felt_cues
+from ..reference.cues import simulator_cues
 from ..reference.kinematics import clearance, legs_of
 from ..reference.machine import MachineModel
 from ..reference.setpoint import MotionState
@@ -39,13 +39,13 @@ def reference_motion(q: np.ndarray, v: np.ndarray) -> MotionState:
 @pytest.mark.parametrize("name", PRESETS)
 def test_cues_are_those_of_the_reference(name):
     q, v, a = random_motion(200)
-    wanted_force, wanted_rate, wanted_head = felt_cues(
+    reference_force, reference_rate, wanted_head = simulator_cues(
         MachineModel.of(PRESETS[name]), reference_motion(q, v), a.T
     )
     machine = SymbolicMachine(PRESETS[name])
     force, rate = machine.cues(q, v, a)
     head, head_rate = machine.head_cues(q, v, a)
-    for found, wanted in [(force, wanted_force), (rate, wanted_rate), (head, wanted_head)]:
+    for found, wanted in [(force, reference_force), (rate, reference_rate), (head, wanted_head)]:
         assert np.abs(np.array(found).T - wanted).max() < AGREE
     assert np.array_equal(np.array(rate), np.array(head_rate))
 
@@ -83,8 +83,8 @@ def test_a_motion_of_the_kernel_is_one_of_the_twin():
         state = simulator.step(a)[0]
         assert state["limits"] == 0
         force, rate = (np.array(part)[:, 0] for part in machine.cues(q, v, a))
-        assert np.abs(state["felt"]["force"] - force).max() < AGREE
-        assert np.abs(state["felt"]["rate"] - rate).max() < AGREE
+        assert np.abs(state["simulator_cue"]["force"] - force).max() < AGREE
+        assert np.abs(state["simulator_cue"]["rate"] - rate).max() < AGREE
         assert np.abs(state["motion"]["position"][2:8] - np.array(machine.legs(q))[:, 0]).max() < AGREE
         assert np.abs(state["motion"]["rate"][2:8] - np.array(machine.leg_rates(q, v))[:, 0]).max() < AGREE
 

@@ -16,13 +16,13 @@ RECORD = Record(
 )
 
 
-def network(sizes, seed: int = 0, normalised: bool = True, **choices: Any) -> Network:
+def network(sizes, seed: int = 0, normalized: bool = True, **choices: Any) -> Network:
     """A network with the sizes of its layers, input first."""
     rng = np.random.default_rng(seed)
     extra = [0] * (len(sizes) - 2) + [sizes[0] if choices.get("skip") else 0]
     shapes = [(b, a + e) for a, b, e in zip(sizes, sizes[1:], extra, strict=False)]
     statistics = {}
-    if normalised:
+    if normalized:
         statistics = {"mean": rng.normal(size=sizes[0]), "variance": rng.uniform(0.01, 4.0, sizes[0])}
     return Network(
         weights=tuple(rng.normal(size=shape) / np.sqrt(shape[1]) for shape in shapes),

@@ -40,10 +40,10 @@ def exact(net: Network, observation) -> np.ndarray:
 
 @pytest.mark.parametrize("activation", list(EXACT))
 @pytest.mark.parametrize(
-    ("squash", "skip", "normalised"), [("clip", True, True), ("tanh", False, True), ("clip", False, False)]
+    ("squash", "skip", "normalized"), [("clip", True, True), ("tanh", False, True), ("clip", False, False)]
 )
-def test_it_computes_its_definition(activation, squash, skip, normalised):
-    net = network((20, 32, 24, 5), activation=activation, squash=squash, skip=skip, normalised=normalised)
+def test_it_computes_its_definition(activation, squash, skip, normalized):
+    net = network((20, 32, 24, 5), activation=activation, squash=squash, skip=skip, normalized=normalized)
     observation = np.random.default_rng(1).normal(scale=3.0, size=(200, 20)).astype(np.float32)
     found, expected = net(observation), exact(net, observation)
     assert found.dtype == np.float32
@@ -63,7 +63,7 @@ def test_one_row_a_vector_and_a_batch_agree():
         assert np.allclose(net(batch)[k], vector, atol=1e-6)
 
 
-def test_normalisation_is_clipped_and_exact_where_an_entry_hardly_varies():
+def test_normalization_is_clipped_and_exact_where_an_entry_hardly_varies():
     weights, biases = (np.eye(2) / 20.0,), (np.zeros(2),)
     mean = np.array([0.981 + 1e-9, 0.0])
     net = Network(weights, biases, mean=mean, variance=np.array([1e-10, 1.0]), clip=5.0)

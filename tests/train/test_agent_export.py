@@ -26,9 +26,9 @@ def few_timings(monkeypatch):
 
 
 @pytest.mark.parametrize("activation", ["tanh", "relu", "elu", "silu"])
-@pytest.mark.parametrize(("squash", "skip", "normalised"), [("clip", True, True), ("tanh", False, False)])
-def test_pytorch_computes_what_numpy_does(activation, squash, skip, normalised):
-    net = network((20, 32, 24, 5), activation=activation, squash=squash, skip=skip, normalised=normalised)
+@pytest.mark.parametrize(("squash", "skip", "normalized"), [("clip", True, True), ("tanh", False, False)])
+def test_pytorch_computes_what_numpy_does(activation, squash, skip, normalized):
+    net = network((20, 32, 24, 5), activation=activation, squash=squash, skip=skip, normalized=normalized)
     observation = np.random.default_rng(1).normal(scale=3.0, size=(100, 20)).astype(np.float32)
     with torch.no_grad():
         found = torch_module(net)(torch.from_numpy(observation)).numpy()

@@ -66,8 +66,8 @@ def test_the_same_agent_comes_back(name, tmp_path):
     assert other.platform == one.platform
 
 
-def test_without_normalisation(tmp_path):
-    one = agent(normalised=False)
+def test_without_normalization(tmp_path):
+    one = agent(normalized=False)
     one.save(tmp_path / "one.safetensors")
     other = Agent.load(tmp_path / "one.safetensors")
     assert other.network.mean is None

@@ -93,7 +93,7 @@ def test_the_gains_are_the_equations(config, seed):
         kept = (1.0 - w.leak) * last[2 + k] + gain * error[k]
         assert told[2 + k] == pytest.approx(kept + (w.leak + gain) * spring)
     for axis, force, sign in ((0, 1, -1.0), (1, 0, 1.0)):
-        lasts = w.tilt_share * rows["wanted_force"][force] + np.dot(w.tilt_shares, memory[:, force])
+        lasts = w.tilt_share * rows["reference_force"][force] + np.dot(w.tilt_shares, memory[:, force])
         angle = sign * lasts / 9.81 - rows["beta"][axis]
         assert told[5 + axis] == pytest.approx(w.rate_gain * rows["rate_error"][axis] + w.stiffness * angle)
     assert told[8] == pytest.approx(w.yaw_gain * rows["rate_error"][2])

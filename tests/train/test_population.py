@@ -76,7 +76,7 @@ def test_what_is_drawn_or_changed_stays_within_its_range(seed, redrawn):
         values = explored(values, SPACE, replace(OPTIONS, redrawn=redrawn), generator)
 
 
-def test_a_change_is_by_one_of_the_factors_by_one_at_least_or_to_a_neighbour():
+def test_a_change_is_by_one_of_the_factors_by_one_at_least_or_to_a_neighbor():
     options = replace(OPTIONS, redrawn=0.0)
     found = [explored({"rate": 1e-2, "size": 2, "kind": "b"}, SPACE, options, random(i)) for i in range(40)]
     assert {round(values["rate"], 12) for values in found} == {0.008, 0.012}

@@ -10,7 +10,7 @@ from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.options import TaskOptions
 from motion_cueing.envs.task.unroll import TaskUnroll
 from motion_cueing.train.algorithms.apg.gradients import Ahead, ThroughTime, ValueOptions, tamed
-from motion_cueing.train.networks import TORCH_ACTIVATIONS, Actor, ActorSteps, begin_at_rest, standardise
+from motion_cueing.train.networks import TORCH_ACTIVATIONS, Actor, ActorSteps, begin_at_rest, standardize
 
 N, ACTIONS = 3, 12
 
@@ -19,7 +19,7 @@ def actor(activation: str = "elu", hidden: tuple[int, ...] = (5, 4)) -> Actor:
     """A network with a standard of its own."""
     torch.manual_seed(1)
     made = Actor(7, 3, hidden, activation)
-    made.standardise(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
+    made.standardize(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
     return made
 
 
@@ -41,7 +41,7 @@ def test_a_standard_changes_nothing_of_what_is_done():
     torch.manual_seed(2)
     network, seen = Actor(7, 3, (5, 4)), torch.randn(6, 7)
     before = network(seen).detach()
-    network.standardise(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
+    network.standardize(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
     np.testing.assert_allclose(network(seen).detach(), before, atol=1e-6)
     np.testing.assert_allclose(network.network()(seen.numpy()), before, atol=1e-6)
 
@@ -64,7 +64,7 @@ def begun(batch: Batch) -> Actor:
     torch.manual_seed(3)
     network = Actor(batch.layout.size, batch.action_size, (8,))
     begin_at_rest(network, batch)
-    standardise(network, batch, 20)
+    standardize(network, batch, 20)
     with torch.no_grad():
         network.head.weight += 0.05 * torch.randn_like(network.head.weight)
     return network
@@ -75,7 +75,7 @@ def test_observations_are_seen_relative_to_their_own_mean_and_deviation(batch):
     network = Actor(batch.layout.size, batch.action_size, (8,))
     begin_at_rest(network, batch)
     batch.seed(np.ones(N, dtype=bool), [4, 5, 6])
-    standardise(network, batch, 20)
+    standardize(network, batch, 20)
     batch.seed(np.ones(N, dtype=bool), [4, 5, 6])
     batch.begin(np.ones(N, dtype=bool))
     batch.observe(np.ones(N, dtype=bool))

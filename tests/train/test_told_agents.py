@@ -20,7 +20,7 @@ from motion_cueing.train.agents.export import export_onnx
 from motion_cueing.train.algorithms.apg.learner import GradientLearner
 from motion_cueing.train.algorithms.dagger.learner import Teacher
 from motion_cueing.train.config import load_config, validation_task
-from motion_cueing.train.networks import Actor, begin_at_rest, standardise
+from motion_cueing.train.networks import Actor, begin_at_rest, standardize
 from motion_cueing.train.validation import Validation
 
 from ..env.tasks import drive
@@ -31,7 +31,7 @@ BUILD = {"travel": [0.5, 1.0], "size": [0.4, 1.0], "without_carriage": 0.4, "wit
 TOLD = {
     "observation": {"preview": 0, "machine": True, "frame": "cab", "memory": [1.0]},
     "action": {"frame": "cab", "repeat": 5, "authority": 0.5},
-    "randomisation": {"machines": 6, "build": BUILD},
+    "randomization": {"machines": 6, "build": BUILD},
 }
 
 
@@ -51,13 +51,13 @@ def test_a_spring_begins_on_machines_that_all_can_move():
 
 
 def test_what_a_machine_can_do_gets_a_standard_that_others_fit_in():
-    task = told(randomisation={"machines": 2, "build": BUILD})
+    task = told(randomization={"machines": 2, "build": BUILD})
     batch = Batch(2, task, drives=[drive()])
     everywhere = np.ones(2, dtype=bool)
     batch.seed(everywhere, [0, 1])
     actor = Actor(batch.layout.size, 9, (8,))
     begin_at_rest(actor, batch)
-    standardise(actor, batch, 10)
+    standardize(actor, batch, 10)
     for platform in map(get_platform, platform_names()):
         first = batch.layout.first(MACHINE[0].name)
         seen = torch.zeros(batch.layout.size)
@@ -118,7 +118,7 @@ def test_the_exported_file_says_what_is_seen_of_the_machine(tmp_path):
 
 def test_the_recipes_machines_are_no_preset_but_around_them():
     config, first = (load_config(None, Path(name)) for name in ("learned-any", "learned-any-washout"))
-    assert config.task.randomisation == first.task.randomisation
+    assert config.task.randomization == first.task.randomization
     machines = machines_of(config.task)
     presets = [get_platform(one) for one in platform_names()]
     assert config.task.observation.machine

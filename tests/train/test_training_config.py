@@ -35,7 +35,7 @@ def test_no_preset_trains_or_validates_on_what_is_evaluated(name):
     assert not {word for word in evaluated if word in text}
     small = {"library": 2, "drive_duration": 1.0}
     episode = load_config(name, task={**yaml.safe_load(text).get("task", {}), "episode": small}).task.episode
-    trained = {drive.name for drive in library_of(episode, config.task.randomisation)}
+    trained = {drive.name for drive in library_of(episode, config.task.randomization)}
     assert len(trained) == 2
     assert not trained & evaluated
 
@@ -59,11 +59,11 @@ def test_validation_drives_that_are_trained_on_are_refused(tmp_path):
         tiny.config(tmp_path, "ppo", task={"episode": {"library_seed": 4}}, validation={"seed": 4})
 
 
-def test_validation_is_whole_random_drives_without_randomisation(tmp_path):
-    randomised = {"force_noise": 0.1, "actuator_gain": 0.1}
-    config = tiny.config(tmp_path, "ppo", task={"randomisation": randomised})
+def test_validation_is_whole_random_drives_without_randomization(tmp_path):
+    randomized = {"force_noise": 0.1, "actuator_gain": 0.1}
+    config = tiny.config(tmp_path, "ppo", task={"randomization": randomized})
     task = validation_task(config)
-    assert task.randomisation.force_noise == task.randomisation.actuator_gain == 0.0
+    assert task.randomization.force_noise == task.randomization.actuator_gain == 0.0
     assert task.episode.duration is None
     assert task.episode.drives == ()
     assert task.observation == config.task.observation

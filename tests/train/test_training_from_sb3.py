@@ -24,7 +24,7 @@ SIZE = layout_of(ObservationOptions(), "acceleration", 9).size
 
 
 def shaken(model) -> None:
-    """Weights as large as after a training: new ones hardly leave the neighbourhood of zero."""
+    """Weights as large as after a training: new ones hardly leave the neighborhood of zero."""
     generator = torch.Generator().manual_seed(3)
     with torch.no_grad():
         for parameter in model.policy.parameters():
@@ -32,7 +32,7 @@ def shaken(model) -> None:
 
 
 def make(name: str, normalized: bool = True, **policy):
-    """A model with its normalisation."""
+    """A model with its normalization."""
     env = DrivingSimulatorVecEnv(2, episode=SHORT)
     env = VecNormalize(env, clip_obs=3.0) if normalized else env
     if normalized:

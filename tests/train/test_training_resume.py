@@ -57,7 +57,7 @@ CASES = {
     "schedules": ("ppo", {"hyperparameters": {"learning_rate": "lin_1e-3", "clip_range": "lin_0.2"}}),
     "residual": ("ppo", {"task": {"action": {"mode": "residual"}}}),
     "gains": ("ppo", {"task": {"action": {"mode": "gains"}}}),
-    "nothing normalised": ("td3", {"normalize": {"observation": False, "reward": False}}),
+    "nothing normalized": ("td3", {"normalize": {"observation": False, "reward": False}}),
     "state-dependent exploration": ("ppo", {"hyperparameters": {"use_sde": True}}),
     "the same off-policy": (
         "sac",

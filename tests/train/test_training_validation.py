@@ -71,12 +71,12 @@ def test_a_drive_that_fails_counts_until_then(tmp_path):
 
 
 def test_tilt_rate_is_what_goes_beyond_the_cars_own():
-    kind = np.dtype([("wanted", [("rate", "f8", 3)]), ("felt", [("rate", "f8", 3)])])
+    kind = np.dtype([("reference_cue", [("rate", "f8", 3)]), ("simulator_cue", [("rate", "f8", 3)])])
     state = np.zeros(4, dtype=kind)
-    state["wanted"]["rate"][:, 0] = [0.1, 0.1, -0.1, 0.0]
-    state["felt"]["rate"][:, 0] = [0.05, 0.3, 0.2, 0.0]
-    state["felt"]["rate"][:, 1] = [0.0, 0.0, 0.0, -0.4]
-    state["felt"]["rate"][:, 2] = 9.0
+    state["reference_cue"]["rate"][:, 0] = [0.1, 0.1, -0.1, 0.0]
+    state["simulator_cue"]["rate"][:, 0] = [0.05, 0.3, 0.2, 0.0]
+    state["simulator_cue"]["rate"][:, 1] = [0.0, 0.0, 0.0, -0.4]
+    state["simulator_cue"]["rate"][:, 2] = 9.0
     assert tilt_rate(state) == pytest.approx([0.0, 0.2, 0.2, 0.4])
 
 

@@ -1,4 +1,4 @@
-"""An agent as an ONNX file: the network with its normalisation, checked and timed."""
+"""An agent as an ONNX file: the network with its normalization, checked and timed."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class Contents:
         activation: Of the network, as the following.
         squash: Of its last layer.
         skip: Whether the last layer sees the observation, too.
-        clip: Of the normalised observation.
+        clip: Of the normalized observation.
         layers: Of the network.
         base: Washout under the agent.
     """
@@ -131,9 +131,9 @@ def network_of(arrays: Mapping[str, NDArray[Any]], values: object, source: str) 
     _check_platform(contents, source)
     layers = range(contents.layers)
     expected = {_weight(k) for k in layers} | {_bias(k) for k in layers}
-    normalised = {_MEAN, _VARIANCE} & arrays.keys()
-    if arrays.keys() - normalised != expected:
-        wrong = ", ".join(sorted((arrays.keys() - normalised) ^ expected))
+    normalized = {_MEAN, _VARIANCE} & arrays.keys()
+    if arrays.keys() - normalized != expected:
+        wrong = ", ".join(sorted((arrays.keys() - normalized) ^ expected))
         raise DataError(f"{source}: arrays missing or unknown: {wrong}")
     network = Network(
         weights=tuple(arrays[_weight(k)] for k in layers),

@@ -1,4 +1,4 @@
-"""A multilayer perceptron in NumPy: the whole of a trained policy, with the normalisation of its input."""
+"""A multilayer perceptron in NumPy: the whole of a trained policy, with the normalization of its input."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ ACTIVATIONS: Final[Mapping[str, Callable[[Array], Array]]] = {
 class Network:
     """From observations to actions in [-1, 1].
 
-    The input is normalised, (x - mean) / sqrt(variance + EPSILON), clipped to +-``clip``, goes through
+    The input is normalized, (x - mean) / sqrt(variance + EPSILON), clipped to +-``clip``, goes through
     hidden layers with the activation and a last linear layer, and is squashed.
 
     Args:
@@ -64,11 +64,11 @@ class Network:
         biases: (outputs,) of each layer, float32.
         activation: Of the hidden layers.
         squash: "clip" or "tanh" of the last layer.
-        skip: Whether the last layer sees [last hidden layer, normalised observation] instead of the
+        skip: Whether the last layer sees [last hidden layer, normalized observation] instead of the
             hidden layer alone.
         mean: (size,) mean of the observation, float64; None leaves it as it is.
         variance: (size,) its variance; given with ``mean``.
-        clip: Largest absolute value of a normalised observation.
+        clip: Largest absolute value of a normalized observation.
 
     Raises:
         DataError: a shape does not fit, a value is not finite, or a name is unknown.
@@ -133,7 +133,7 @@ class Network:
         return int(self.weights[-1].shape[0])
 
     @cached_property
-    def normalisation(self) -> tuple[Array, Array, Array]:
+    def normalization(self) -> tuple[Array, Array, Array]:
         """(size,) mean, what float32 loses of the mean, and factor.
 
         Taking the mean off in two parts is as exact as float64: a nearly constant entry has a large factor.
@@ -156,7 +156,7 @@ class Network:
         return self._forward(x)
 
     def _forward(self, x: Array) -> Array:
-        x = hidden = self._normalised(x)
+        x = hidden = self._normalized(x)
         activate = ACTIVATIONS[self.activation]
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             hidden = activate(hidden.dot(weight.T) + bias)
@@ -166,13 +166,13 @@ class Network:
         squashed: Array = np.tanh(out) if self.squash == "tanh" else np.minimum(np.maximum(out, -_ONE), _ONE)
         return squashed
 
-    def _normalised(self, x: Array) -> Array:
+    def _normalized(self, x: Array) -> Array:
         if self.mean is None:
             return x
-        high, low, factor = self.normalisation
+        high, low, factor = self.normalization
         lowest, highest = self._bounds
-        normalised: Array = np.minimum(np.maximum((x - high - low) * factor, lowest), highest)
-        return normalised
+        normalized: Array = np.minimum(np.maximum((x - high - low) * factor, lowest), highest)
+        return normalized
 
 
 def _check_choice(name: str, value: Any, known: Sequence[str]) -> None:
@@ -210,7 +210,7 @@ _ACTIVATIONS: Final[Mapping[str, Callable[[Tensor], Tensor]]] = {
 
 
 class TorchNetwork(nn.Module):
-    """A network with its normalisation; see :class:`~.network.Network`.
+    """A network with its normalization; see :class:`~.network.Network`.
 
     Args:
         network: In NumPy.
@@ -220,14 +220,14 @@ class TorchNetwork(nn.Module):
         super().__init__()
         self._activate = _ACTIVATIONS[network.activation]
         self._squash, self._skip, self._clip = network.squash, network.skip, network.clip
-        self._normalises = network.mean is not None
-        for name, values in zip(("high", "low", "factor"), network.normalisation, strict=True):
+        self._normalizes = network.mean is not None
+        for name, values in zip(("high", "low", "factor"), network.normalization, strict=True):
             self.register_buffer(name, torch.from_numpy(values.copy()))
         self.layers = nn.ModuleList(map(_linear, network.weights, network.biases))
 
     def forward(self, observation: Tensor) -> Tensor:
         """Actions (n, k) in [-1, 1] for observations (n, size)."""
-        x = hidden = self._normalised(observation)
+        x = hidden = self._normalized(observation)
         *first, last = self.layers
         for layer in first:
             hidden = self._activate(layer(hidden))
@@ -236,8 +236,8 @@ class TorchNetwork(nn.Module):
         out: Tensor = last(hidden)
         return torch.tanh(out) if self._squash == "tanh" else torch.clamp(out, -1.0, 1.0)
 
-    def _normalised(self, x: Tensor) -> Tensor:
-        if not self._normalises:
+    def _normalized(self, x: Tensor) -> Tensor:
+        if not self._normalizes:
             return x
         high, low, factor = (self.get_buffer(name) for name in ("high", "low", "factor"))
         return torch.clamp((x - high - low) * factor, -self._clip, self._clip)

@@ -1,4 +1,4 @@
-"""The filter blocks of the washout, as states and accelerations, discretised by the trapezoidal rule.
+"""The filter blocks of the washout, as states and accelerations, discretized by the trapezoidal rule.
 
 A high-pass before a double integrator is one oscillator: its acceleration is the filter's output and its
 position the integral, so the zeros at s = 0 (z = 1) cancel the integrators exactly and nothing drifts.
@@ -246,9 +246,9 @@ def read_observation(row: wp.array2d(dtype=real), i: int) -> Reading:
     one = real(1.0)
     seen = Reading()
     seen.force = triple(
-        row, i, wp.static(SLICES["wanted_force"].start), real(wp.static(SCALES["wanted_force"]))
+        row, i, wp.static(SLICES["reference_force"].start), real(wp.static(SCALES["reference_force"]))
     ) - vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
-    seen.rate = triple(row, i, wp.static(SLICES["wanted_rate"].start), one)
+    seen.rate = triple(row, i, wp.static(SLICES["reference_rate"].start), one)
     seen.carriage = pair(row, i, wp.static(SLICES["carriage"].start), real(wp.static(SCALES["carriage"])))
     seen.carriage_rate = pair(
         row, i, wp.static(SLICES["carriage_rate"].start), real(wp.static(SCALES["carriage_rate"]))
@@ -268,8 +268,8 @@ def read_state(state: State) -> Reading:
     """The same straight from the simulator's state."""
     p = state.setpoint
     seen = Reading()
-    seen.force = state.wanted.force
-    seen.rate = state.wanted.rate
+    seen.force = state.reference_cue.force
+    seen.rate = state.reference_cue.rate
     seen.carriage = vec2(p.position[0], p.position[1])
     seen.carriage_rate = vec2(p.rate[0], p.rate[1])
     seen.displacement = p.displacement

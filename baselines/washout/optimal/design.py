@@ -177,7 +177,7 @@ class StateSpace:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Minimise the mean of y'Qy, y = C z + D u + H w.
+    """Minimize the mean of y'Qy, y = C z + D u + H w.
 
     dz/dt = A z + B u + E w, dw/dt = -diag(bandwidth) w + noise.
 
@@ -226,10 +226,10 @@ class Solution:
 
 
 def solve(problem: Problem) -> Solution:
-    """The regulator that minimises the cost.
+    """The regulator that minimizes the cost.
 
     Raises:
-        ConfigurationError: the Riccati equation has no stabilising solution in floating point.
+        ConfigurationError: the Riccati equation has no stabilizing solution in floating point.
     """
     a, b, c = problem.joint
     weighted = problem.q[:, None] * c

@@ -230,11 +230,11 @@ def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
     road.y = here[1] + flat * (inside * wp.sin(middle) + outside * wp.sin(road.heading))
     steepening = (there[5] - here[5]) / real(STEP)
     road.slope.grade = here[4] + here[5] * inside + real(0.5) * steepening * inside * inside
-    road.slope.per_metre = here[5] + steepening * inside
-    road.slope.per_square_metre = steepening
+    road.slope.per_meter = here[5] + steepening * inside
+    road.slope.per_square_meter = steepening
     if outside != real(0.0):
-        road.slope.per_metre = real(0.0)
-        road.slope.per_square_metre = real(0.0)
+        road.slope.per_meter = real(0.0)
+        road.slope.per_square_meter = real(0.0)
     return road
 
 
@@ -349,7 +349,7 @@ def decide(
     if task.open_loop == 0:
         command.wheel = wheel_command(car, driver, state, errors)
     command.grade = slope.grade
-    command.grade_per_metre = slope.per_metre
+    command.grade_per_meter = slope.per_meter
     return command
 
 

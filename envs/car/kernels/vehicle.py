@@ -71,7 +71,7 @@ class Commands:
     brake: real  # brake force asked for, N
     resistance: real  # brakes and rolling resistance, opposing the motion, N, see (C8)
     grade: real  # slope of the road along the path, rad, uphill positive
-    grade_per_metre: real  # rad/m
+    grade_per_meter: real  # rad/m
 
 
 @wp.struct
@@ -172,7 +172,7 @@ def air_drag(car: CarParameters, speed: real) -> real:
 @wp.func
 def normal_gravity(command: Commands, speed: real) -> real:
     """(C6) Gravity and the centripetal acceleration of crests and dips, normal to the road, m/s^2."""
-    return real(GRAVITY) * wp.cos(command.grade) + command.grade_per_metre * speed * speed
+    return real(GRAVITY) * wp.cos(command.grade) + command.grade_per_meter * speed * speed
 
 
 @wp.func
@@ -352,8 +352,8 @@ class Slope:
     """The road under the car, along its path."""
 
     grade: real  # rad, uphill positive
-    per_metre: real  # rad/m
-    per_square_metre: real  # rad/m^2
+    per_meter: real  # rad/m
+    per_square_meter: real  # rad/m^2
 
 
 @wp.struct
@@ -382,8 +382,8 @@ def cues(car: CarParameters, state: State, rate: State, slope: Slope) -> Cue:
     turn = road_to_body(state[ROLL], state[PITCH])
 
     # The road's frame yaws with the car and pitches with the slope.
-    tilt = slope.per_metre * u
-    tilting = slope.per_square_metre * u * u + slope.per_metre * rate[FORWARD]
+    tilt = slope.per_meter * u
+    tilting = slope.per_square_meter * u * u + slope.per_meter * rate[FORWARD]
     carried = turn * vec3(zero, tilt, r)
     carried_rate = turn * vec3(zero, tilting, rate[YAW_RATE])
     acceleration = vec3(rate[FORWARD] - v * r, rate[LATERAL] + u * r, -tilt * u)

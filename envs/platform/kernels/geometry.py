@@ -97,7 +97,7 @@ def angular_acceleration(beta: vec3, beta_rate: vec3, beta_acceleration: vec3) -
 
 
 NEWTON_ITERATIONS = wp.constant(20)
-"""More than Newton ever needs from a neighbouring pose (3 to 5)."""
+"""More than Newton ever needs from a neighboring pose (3 to 5)."""
 
 NEWTON_TOLERANCE = wp.constant(real(1e-13 if real is wp.float64 else 1e-6))
 """Largest leg error at which the iteration stops, m."""
@@ -105,7 +105,7 @@ NEWTON_TOLERANCE = wp.constant(real(1e-13 if real is wp.float64 else 1e-6))
 
 @wp.struct
 class HexapodGeometry:
-    """Constants of a hexapod, in metres."""
+    """Constants of a hexapod, in meters."""
 
     upper: mat63  # A_i in F_H, one row a leg
     lower: mat63  # B_i in F_V
@@ -217,7 +217,7 @@ def platform_rates(jacobian: Jacobian, beta: vec3, rates: vec6) -> vec6:
 
 @wp.func
 def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3) -> vec6:
-    """Pose [s, beta] with these leg extensions, by Newton iteration from a neighbouring pose."""
+    """Pose [s, beta] with these leg extensions, by Newton iteration from a neighboring pose."""
     s = displacement
     b = beta
     error = extensions - leg_extensions(g, s, b)

@@ -167,7 +167,7 @@ class Step:
 # The lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere
 # negative: position, speed and acceleration of the machine are weighted means of those of the set-point,
 # and keep every limit the set-point keeps. Within a step the set-point moves with constant acceleration;
-# for that input the lag is discretised exactly.
+# for that input the lag is discretized exactly.
 
 
 @configuration
@@ -243,7 +243,7 @@ NEARLY_SINGULAR = wp.constant(real(0.15))
 FAR_FROM_SINGULAR = wp.constant(real(0.75))
 """Clearance from which braking is taken not to lead to a singular pose."""
 
-NEIGHBOURHOOD = wp.constant(real(0.35))
+NEIGHBORHOOD = wp.constant(real(0.35))
 """Largest change of an Euler angle while the legs brake, rad; more means a singular pose between."""
 
 
@@ -255,7 +255,7 @@ def clearance(m: Machine, displacement: vec3, beta: vec3) -> real:
 
 @wp.func
 def is_clear(m: Machine, pose: vec6, extensions: vec6, beta: vec3, least: real) -> bool:
-    """Whether a pose has these legs, is a neighbour of the one with ``beta``, and not nearly singular.
+    """Whether a pose has these legs, is a neighbor of the one with ``beta``, and not nearly singular.
 
     Behind a singular pose Newton's iteration finds no pose, or one far off. Comparisons with NaN are false.
     """
@@ -263,7 +263,7 @@ def is_clear(m: Machine, pose: vec6, extensions: vec6, beta: vec3, least: real) 
     angles = vec3(pose[3], pose[4], pose[5])
     error = wp.max(wp.abs(leg_extensions(m.geometry, displacement, angles) - extensions))
     closes = error <= real(10.0) * NEWTON_TOLERANCE
-    near = wp.max(wp.abs(angles - beta)) <= NEIGHBOURHOOD
+    near = wp.max(wp.abs(angles - beta)) <= NEIGHBORHOOD
     return closes and near and clearance(m, displacement, angles) >= least
 
 
@@ -412,7 +412,7 @@ def with_pose(motion: Motion, pose: vec6, pose_rate: vec6) -> Motion:
 
 @wp.func
 def pose_from_legs(m: Machine, motion: Motion, guess: Motion) -> Motion:
-    """The motion whose pose and rates follow from its legs, by forward kinematics from a neighbouring one."""
+    """The motion whose pose and rates follow from its legs, by forward kinematics from a neighboring one."""
     pose = forward_kinematics(m.geometry, legs_of(motion.position), guess.displacement, guess.beta)
     beta = vec3(pose[3], pose[4], pose[5])
     jacobian = leg_jacobian(m.geometry, vec3(pose[0], pose[1], pose[2]), beta)

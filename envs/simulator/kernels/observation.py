@@ -41,10 +41,12 @@ class Row:
 
 
 ROWS: Final = (
-    Row("wanted_force", 3, 10.0, "m/s^2", "car's specific force, gravity at rest taken off z"),
-    Row("wanted_rate", 3, 1.0, "rad/s", "car's angular velocity"),
-    Row("felt_force", 3, 10.0, "m/s^2", "specific force at the cab's reference point, as wanted_force"),
-    Row("felt_rate", 3, 1.0, "rad/s", "angular velocity of the cab"),
+    Row("reference_force", 3, 10.0, "m/s^2", "car's specific force, gravity at rest taken off z"),
+    Row("reference_rate", 3, 1.0, "rad/s", "car's angular velocity"),
+    Row(
+        "simulator_force", 3, 10.0, "m/s^2", "specific force at the cab's reference point, as reference_force"
+    ),
+    Row("simulator_rate", 3, 1.0, "rad/s", "angular velocity of the cab"),
     Row("carriage", 2, 10.0, "m", "carriage x, y"),
     Row("carriage_rate", 2, 5.0, "m/s", "their rates"),
     Row("displacement", 3, 1.0, "m", "hexapod x, y, z from neutral"),
@@ -113,11 +115,11 @@ def write_observation(
     """
     gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
     one = real(1.0)
-    wanted = s.wanted.force + gravity
-    felt = cues.force + gravity
-    k = put(out, i, 0, wanted, 3, real(wp.static(SCALES["wanted_force"])))
-    k = put(out, i, k, s.wanted.rate, 3, one)
-    k = put(out, i, k, felt, 3, real(wp.static(SCALES["felt_force"])))
+    reference = s.reference_cue.force + gravity
+    simulated = cues.force + gravity
+    k = put(out, i, 0, reference, 3, real(wp.static(SCALES["reference_force"])))
+    k = put(out, i, k, s.reference_cue.rate, 3, one)
+    k = put(out, i, k, simulated, 3, real(wp.static(SCALES["simulator_force"])))
     k = put(out, i, k, cues.rate, 3, one)
     k = put(out, i, k, p.position, 2, real(wp.static(SCALES["carriage"])))
     k = put(out, i, k, p.rate, 2, real(wp.static(SCALES["carriage_rate"])))
@@ -145,7 +147,7 @@ def observe_kernel(
     """Observation of every environment."""
     i = wp.tid()
     s = state[i]
-    write_observation(machines[machine_of[i]], s, s.setpoint, s.acceleration, s.felt, out, i)
+    write_observation(machines[machine_of[i]], s, s.setpoint, s.acceleration, s.simulator_cue, out, i)
 
 
 observe_forward = wp.kernel(observe_kernel, enable_backward=False, module="unique")

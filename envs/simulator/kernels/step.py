@@ -33,12 +33,12 @@ class State:
     acceleration: vec9  # of the true machine over the last step, in the order of AXES
     setpoint_acceleration: vec9  # of the set-points, likewise
     limits: wp.uint64  # limits met in the last step, see platform.state.Step
-    wanted: Cues
-    felt: Cues
-    vestibular_wanted: VestibularState
-    vestibular_felt: VestibularState
-    sensed_wanted: Sensed
-    sensed_felt: Sensed
+    reference_cue: Cues
+    simulator_cue: Cues
+    vestibular_reference: VestibularState
+    vestibular_simulator: VestibularState
+    perceived_reference: Sensed
+    perceived_simulator: Sensed
 
 
 @wp.struct
@@ -86,23 +86,29 @@ def zone(cost: CueCost) -> Any:
 
 
 @wp.func
-def error(z: Zone, force: vec3, wanted_force: vec3, rate: vec3, wanted_rate: vec3) -> real:
+def error(z: Zone, force: vec3, reference_force: vec3, rate: vec3, reference_rate: vec3) -> real:
     """The cost of a pair of signals."""
-    df = (force - wanted_force) / z.force
-    dw = (rate - wanted_rate) / z.rate
+    df = (force - reference_force) / z.force
+    dw = (rate - reference_rate) / z.rate
     return wp.dot(df, df) + wp.dot(dw, dw)
 
 
 @wp.func
 def cue_error(z: Zone, s: State) -> real:
     """The cost of what is felt at the cab's reference point."""
-    return error(z, s.felt.force, s.wanted.force, s.felt.rate, s.wanted.rate)
+    return error(z, s.simulator_cue.force, s.reference_cue.force, s.simulator_cue.rate, s.reference_cue.rate)
 
 
 @wp.func
 def perceived_error(z: Zone, s: State) -> real:
     """The cost of what the driver senses."""
-    return error(z, s.sensed_felt.force, s.sensed_wanted.force, s.sensed_felt.rate, s.sensed_wanted.rate)
+    return error(
+        z,
+        s.perceived_simulator.force,
+        s.perceived_reference.force,
+        s.perceived_simulator.rate,
+        s.perceived_reference.rate,
+    )
 
 
 # The step of one environment: machine, cues and perception. One definition serves every kernel.
@@ -111,7 +117,7 @@ def perceived_error(z: Zone, s: State) -> real:
 
 
 @wp.func
-def wanted_cues(m: Machine, drives: Drives, drive: int, sample: int) -> Cues:
+def reference_cues(m: Machine, drives: Drives, drive: int, sample: int) -> Cues:
     """The car's cues at a sample of a drive (the last one after its end), the head as in the machine."""
     i = drives.first[drive] + wp.clamp(sample, 0, drives.length[drive] - 1)
     cues = Cues()
@@ -126,7 +132,7 @@ def wanted_cues(m: Machine, drives: Drives, drive: int, sample: int) -> Cues:
 
 
 @wp.func
-def felt_cues(m: Machine, motion: Motion, acceleration: vec9) -> Cues:
+def simulator_cues(m: Machine, motion: Motion, acceleration: vec9) -> Cues:
     """The cues of the true motion, Eqs. (1), (7), (40), at the cab's reference point and at the head."""
     origin = vec3(acceleration[0] + acceleration[2], acceleration[1] + acceleration[3], acceleration[4])
     beta_acceleration = vec3(acceleration[5], acceleration[6], acceleration[7])
@@ -161,12 +167,16 @@ def initial_state(m: Machine, v: Vestibular, drives: Drives, drive: int, sample:
     state.sample = sample
     state.motion = rest_motion(m, start)
     state.setpoint = state.motion
-    state.wanted = wanted_cues(m, drives, drive, sample)
-    state.felt = felt_cues(m, state.motion, vec9())
-    state.vestibular_wanted = rested(v, state.wanted.head_force, state.wanted.rate)
-    state.vestibular_felt = rested(v, state.felt.head_force, state.felt.rate)
-    state.sensed_wanted = sense(v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate)
-    state.sensed_felt = sense(v, state.vestibular_felt, state.felt.head_force, state.felt.rate)
+    state.reference_cue = reference_cues(m, drives, drive, sample)
+    state.simulator_cue = simulator_cues(m, state.motion, vec9())
+    state.vestibular_reference = rested(v, state.reference_cue.head_force, state.reference_cue.rate)
+    state.vestibular_simulator = rested(v, state.simulator_cue.head_force, state.simulator_cue.rate)
+    state.perceived_reference = sense(
+        v, state.vestibular_reference, state.reference_cue.head_force, state.reference_cue.rate
+    )
+    state.perceived_simulator = sense(
+        v, state.vestibular_simulator, state.simulator_cue.head_force, state.simulator_cue.rate
+    )
     return state
 
 
@@ -194,16 +204,20 @@ def next_state(
     after.motion = motion
     after.acceleration = acceleration
     after.setpoint_acceleration = mean_acceleration(state.setpoint, commanded.motion, dt)
-    after.wanted = wanted_cues(m, drives, drive, after.sample)
-    after.felt = felt_cues(m, motion, acceleration)
-    after.vestibular_wanted = advance_vestibular(
-        v, state.vestibular_wanted, state.wanted.head_force, state.wanted.rate
+    after.reference_cue = reference_cues(m, drives, drive, after.sample)
+    after.simulator_cue = simulator_cues(m, motion, acceleration)
+    after.vestibular_reference = advance_vestibular(
+        v, state.vestibular_reference, state.reference_cue.head_force, state.reference_cue.rate
     )
-    after.vestibular_felt = advance_vestibular(
-        v, state.vestibular_felt, state.felt.head_force, state.felt.rate
+    after.vestibular_simulator = advance_vestibular(
+        v, state.vestibular_simulator, state.simulator_cue.head_force, state.simulator_cue.rate
     )
-    after.sensed_wanted = sense(v, after.vestibular_wanted, after.wanted.head_force, after.wanted.rate)
-    after.sensed_felt = sense(v, after.vestibular_felt, after.felt.head_force, after.felt.rate)
+    after.perceived_reference = sense(
+        v, after.vestibular_reference, after.reference_cue.head_force, after.reference_cue.rate
+    )
+    after.perceived_simulator = sense(
+        v, after.vestibular_simulator, after.simulator_cue.head_force, after.simulator_cue.rate
+    )
     return after
 
 

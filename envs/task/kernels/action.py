@@ -115,9 +115,9 @@ def applied_accelerations(scale: ActionScale, m: Motion, own: vec9, base: vec9) 
     """What the axes are told: ``own`` accelerations in the machine's frame, with the base policy's."""
     if scale.mode == GAINS:
         return wp.cw_mul(base, scale.free)
-    wanted = own
+    reference = own
     if scale.cab_frame != 0:
-        wanted = to_machine(m, own)
+        reference = to_machine(m, own)
     if scale.mode == RESIDUAL:
-        wanted = wanted + base
-    return wp.cw_mul(wanted, scale.free)
+        reference = reference + base
+    return wp.cw_mul(reference, scale.free)

@@ -109,7 +109,7 @@ def look_at(
 ) -> int:
     """Write the observation of an environment, or parts of it."""
     if parts & CORE:
-        write_observation(m, s, s.setpoint, s.acceleration, s.felt, a.core, i)
+        write_observation(m, s, s.setpoint, s.acceleration, s.simulator_cue, a.core, i)
     if parts & FRAME:
         command = a.command[i]
         shift_frames(a.observation, i, rules.places.frame)

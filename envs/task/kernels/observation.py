@@ -14,10 +14,10 @@ from ...platform.kernels.step import Machine, Motion
 from ...platform.machines import Platform
 from ...platform.parameters import UNLIMITED
 from ...simulator.kernels.observation import SCALES, SLICES, share_of_limit, write_observation
-from ...simulator.kernels.step import Cues, Drives, State, felt_cues
+from ...simulator.kernels.step import Cues, Drives, State, simulator_cues
 from .. import draws
 from ..observation import MACHINE, Layout
-from ..options import EpisodeOptions, ObservationOptions, RandomisationOptions
+from ..options import EpisodeOptions, ObservationOptions, RandomizationOptions
 
 
 @wp.func
@@ -185,7 +185,7 @@ def fill_episodes(
     mask: NDArray[np.bool_],
     words: NDArray[np.uint64],
     last: NDArray[np.int32],
-    options: RandomisationOptions,
+    options: RandomizationOptions,
 ) -> None:
     """Write the constants of the masked environments' episodes; ``words`` and ``last`` are theirs alone."""
     signed = 2.0 * draws.uniform(words) - 1.0
@@ -240,14 +240,14 @@ def put_travel_used(
 # The observation of an environment: rows in float32, sensor errors, preview, and stacking.
 
 
-FORCE = wp.constant(real(SCALES["wanted_force"]))
+FORCE = wp.constant(real(SCALES["reference_force"]))
 CARRIAGE = wp.constant(real(SCALES["carriage"]))
 CARRIAGE_RATE = wp.constant(real(SCALES["carriage_rate"]))
 ACCELERATION = wp.constant(real(SCALES["acceleration"]))
-WANTED_FORCE = wp.constant(SLICES["wanted_force"].start)
-WANTED_RATE = wp.constant(SLICES["wanted_rate"].start)
-FELT_FORCE = wp.constant(SLICES["felt_force"].start)
-FELT_RATE = wp.constant(SLICES["felt_rate"].start)
+REFERENCE_FORCE = wp.constant(SLICES["reference_force"].start)
+REFERENCE_RATE = wp.constant(SLICES["reference_rate"].start)
+SIMULATOR_FORCE = wp.constant(SLICES["simulator_force"].start)
+SIMULATOR_RATE = wp.constant(SLICES["simulator_rate"].start)
 
 
 @wp.struct
@@ -269,24 +269,27 @@ class Places:
     preview_samples: int
     preview_stride: int  # time steps between samples
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
-    modelled: int  # whether the cab's cues are those of the set-points
+    modeled: int  # whether the cab's cues are those of the set-points
     force_noise: real  # m/s^2
     rate_noise: real  # rad/s
     abilities: wp.array2d(dtype=wp.float32)  # what each machine can do, the constant rows
 
 
-def places_of(layout: Layout, seen: ObservationOptions, dt: float, noise: RandomisationOptions) -> Any:
+def places_of(layout: Layout, seen: ObservationOptions, dt: float, noise: RandomizationOptions) -> Any:
     """The kernel's form of a layout, but for what machines can do."""
     places: Any = Places()
     places.frame = layout.frame
     for name in ("force_error", "rate_error", "last_action", "command", "base_action", "preview", "memory"):
         setattr(places, name, layout.first(name))
-    places.perceived, places.true_motion = layout.first("sensed_wanted_force"), layout.first("true_carriage")
+    places.perceived, places.true_motion = (
+        layout.first("perceived_reference_force"),
+        layout.first("true_carriage"),
+    )
     places.machine, places.travel_used = layout.first(MACHINE[0].name), layout.first("travel_used")
     places.preview_samples = seen.preview
     places.preview_stride = max(1, round(seen.preview_spacing / dt))
     places.cab_frame = int(seen.frame == "cab")
-    places.modelled = int(seen.felt == "model")
+    places.modeled = int(seen.simulator_cue == "model")
     places.force_noise, places.rate_noise = noise.force_noise, noise.rate_noise
     return places
 
@@ -336,13 +339,13 @@ def put_fixed(
     """Write the fixed rows, the cab's cues as sensors or the model tell them, and the car's minus them."""
     # A generator of its own for each sample: what is seen does not depend on how often it is looked at.
     random = wp.rand_init(e.noise, sample)
-    noisy = p.force_noise + p.rate_noise > real(0.0) and p.modelled == 0
+    noisy = p.force_noise + p.rate_noise > real(0.0) and p.modeled == 0
     force_gain = real(1.0)
     rate_gain = real(1.0)
-    if p.modelled == 0:
+    if p.modeled == 0:
         force_gain = e.force_gain
         rate_gain = e.rate_gain
-    for k in range(FELT_FORCE):
+    for k in range(SIMULATOR_FORCE):
         put_entry(out, i, k, fixed[i, k], bounds)
     for k in range(3):
         force_noise = real(0.0)
@@ -350,13 +353,13 @@ def put_fixed(
         if noisy:
             force_noise = p.force_noise / FORCE * real(wp.randn(random))
             rate_noise = p.rate_noise * real(wp.randn(random))
-        force = fixed[i, FELT_FORCE + k] * force_gain + force_noise
-        rate = fixed[i, FELT_RATE + k] * rate_gain + rate_noise
-        put_entry(out, i, FELT_FORCE + k, force, bounds)
-        put_entry(out, i, FELT_RATE + k, rate, bounds)
-        put_entry(out, i, p.force_error + k, fixed[i, WANTED_FORCE + k] - force, bounds)
-        put_entry(out, i, p.rate_error + k, fixed[i, WANTED_RATE + k] - rate, bounds)
-    for k in range(FELT_RATE + 3, fixed.shape[1]):
+        force = fixed[i, SIMULATOR_FORCE + k] * force_gain + force_noise
+        rate = fixed[i, SIMULATOR_RATE + k] * rate_gain + rate_noise
+        put_entry(out, i, SIMULATOR_FORCE + k, force, bounds)
+        put_entry(out, i, SIMULATOR_RATE + k, rate, bounds)
+        put_entry(out, i, p.force_error + k, fixed[i, REFERENCE_FORCE + k] - force, bounds)
+        put_entry(out, i, p.rate_error + k, fixed[i, REFERENCE_RATE + k] - rate, bounds)
+    for k in range(SIMULATOR_RATE + 3, fixed.shape[1]):
         put_entry(out, i, k, fixed[i, k], bounds)
     return 0
 
@@ -434,7 +437,7 @@ def seen_axes(p: Places, m: Motion, v: vec9) -> vec9:
 @wp.func
 def seen_acceleration(p: Places, s: State) -> vec9:
     """The acceleration that the observation tells: of the true motion, or of the set-points."""
-    if p.modelled != 0:
+    if p.modeled != 0:
         return s.setpoint_acceleration
     return s.acceleration
 
@@ -442,9 +445,9 @@ def seen_acceleration(p: Places, s: State) -> vec9:
 @wp.func
 def seen_cues(p: Places, m: Machine, s: State) -> Cues:
     """The cab's cues that the observation tells, likewise."""
-    if p.modelled != 0:
-        return felt_cues(m, s.setpoint, s.setpoint_acceleration)
-    return s.felt
+    if p.modeled != 0:
+        return simulator_cues(m, s.setpoint, s.setpoint_acceleration)
+    return s.simulator_cue
 
 
 @wp.func
@@ -484,8 +487,8 @@ def write_frame(
     if p.memory >= 0:
         put_memory(p, drives, drive, s.sample, memory, bounds, out, i)
     if p.perceived >= 0:
-        k = put_cues(out, i, p.perceived, s.sensed_wanted.force, s.sensed_wanted.rate, bounds)
-        put_cues(out, i, k, s.sensed_felt.force, s.sensed_felt.rate, bounds)
+        k = put_cues(out, i, p.perceived, s.perceived_reference.force, s.perceived_reference.rate, bounds)
+        put_cues(out, i, k, s.perceived_simulator.force, s.perceived_simulator.rate, bounds)
     if p.true_motion >= 0:
         put_motion(out, i, p.true_motion, seen_motion(p, s.motion), bounds)
     if p.machine >= 0:

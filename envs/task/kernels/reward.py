@@ -58,11 +58,11 @@ def reward_scale(options: RewardOptions, terminate: bool) -> Any:
 
 
 @wp.func
-def false_cue(wanted: real, felt: real, threshold: real, scale: real) -> real:
+def false_cue(reference: real, simulated: real, threshold: real, scale: real) -> real:
     """Squared error over ``scale`` where the cab moves noticeably and the car does not, or against it."""
-    error = felt - wanted
-    against = wp.abs(wanted) <= threshold or wanted * felt < real(0.0)
-    if against and wp.abs(felt) > threshold and wp.abs(error) > threshold:
+    error = simulated - reference
+    against = wp.abs(reference) <= threshold or reference * simulated < real(0.0)
+    if against and wp.abs(simulated) > threshold and wp.abs(error) > threshold:
         return error * error / (scale * scale)
     return real(0.0)
 
@@ -71,27 +71,29 @@ def false_cue(wanted: real, felt: real, threshold: real, scale: real) -> real:
 def false_cues(r: RewardScale, s: State) -> real:
     """False cues of all six axes, at the cab's reference point; forces relative to rest."""
     gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
-    wanted = s.wanted.force + gravity
-    felt = s.felt.force + gravity
+    reference = s.reference_cue.force + gravity
+    simulated = s.simulator_cue.force + gravity
     total = real(0.0)
     for k in range(3):
-        total = total + false_cue(wanted[k], felt[k], r.force_threshold[k], r.zone.force)
-        total = total + false_cue(s.wanted.rate[k], s.felt.rate[k], r.rate_threshold[k], r.zone.rate)
+        total = total + false_cue(reference[k], simulated[k], r.force_threshold[k], r.zone.force)
+        total = total + false_cue(
+            s.reference_cue.rate[k], s.simulator_cue.rate[k], r.rate_threshold[k], r.zone.rate
+        )
     return total
 
 
 @wp.func
-def beyond(wanted: real, felt: real) -> real:
+def beyond(reference: real, simulated: real) -> real:
     """The part of ``felt`` outside the interval between zero and ``wanted``."""
     zero = real(0.0)
-    return felt - wp.clamp(felt, wp.min(wanted, zero), wp.max(wanted, zero))
+    return simulated - wp.clamp(simulated, wp.min(reference, zero), wp.max(reference, zero))
 
 
 @wp.func
 def tilt_excess(r: RewardScale, s: State) -> real:
     """Square of the tilt rate above its threshold, in thresholds."""
-    roll = beyond(s.wanted.rate[0], s.felt.rate[0])
-    pitch = beyond(s.wanted.rate[1], s.felt.rate[1])
+    roll = beyond(s.reference_cue.rate[0], s.simulator_cue.rate[0])
+    pitch = beyond(s.reference_cue.rate[1], s.simulator_cue.rate[1])
     squared = (roll * roll + pitch * pitch) / (r.tilt_rate * r.tilt_rate)
     # Before the root, whose derivative at zero is infinite.
     if squared <= real(1.0):

@@ -12,7 +12,7 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
-from motion_cueing.evaluation.endurance.results import EnduranceResults, Endured, EnduredDrive, summarised
+from motion_cueing.evaluation.endurance.results import EnduranceResults, Endured, EnduredDrive, summarized
 from motion_cueing.evaluation.endurance.run import Asked, Run, Stopped
 from motion_cueing.evaluation.policies import make_policy
 
@@ -118,13 +118,13 @@ def drive(seed, nominal, slower):
 
 def test_drives_in_one():
     drives = [drive(1, endured(1.0), endured(4.0)), drive(2, endured(3.0), endured(2.0, 5))]
-    found = summarised(drives, 0.01)
+    found = summarized(drives, 0.01)
     assert (found.cue_error, found.slower_cue_error, found.ratio) == (2.0, 3.0, 1.5)
     assert (found.worst, found.worst_cue_error) == ("urban-1", 4.0)
     assert found.hours == pytest.approx(2.0 / 3600.0)
     assert (found.beyond, found.exceeded, found.withstood) == (5, {"position": 5}, False)
-    assert not summarised([drive(1, endured(), endured(not_finite=1))], 0.01).withstood
-    lost = summarised([drive(1, endured(), endured(2.0)), drive(3, endured(), endured(None, 1))], 0.01)
+    assert not summarized([drive(1, endured(), endured(not_finite=1))], 0.01).withstood
+    lost = summarized([drive(1, endured(), endured(2.0)), drive(3, endured(), endured(None, 1))], 0.01)
     assert (lost.worst, lost.slower_cue_error, lost.ratio) == ("urban-3", None, None)
 
 

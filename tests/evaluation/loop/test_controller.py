@@ -113,9 +113,11 @@ def test_cues_fade_in_when_the_policy_begins():
         bench.send(force=(1.0, 0.0, -9.81), rate=(0.0, 0.0, 0.2))
         bench.step()
     wanted = bench.trajectory()
-    np.testing.assert_allclose(wanted.f_wanted[:, 0], np.minimum(np.arange(100) / 50, 1.0), atol=1e-12)
-    np.testing.assert_allclose(wanted.w_wanted[:, 2], 0.2 * np.minimum(np.arange(100) / 50, 1.0), atol=1e-12)
-    np.testing.assert_allclose(wanted.f_wanted[:, 2], -9.81)
+    np.testing.assert_allclose(wanted.f_reference[:, 0], np.minimum(np.arange(100) / 50, 1.0), atol=1e-12)
+    np.testing.assert_allclose(
+        wanted.w_reference[:, 2], 0.2 * np.minimum(np.arange(100) / 50, 1.0), atol=1e-12
+    )
+    np.testing.assert_allclose(wanted.f_reference[:, 2], -9.81)
 
 
 @pytest.mark.parametrize("strange", STRANGE.values(), ids=STRANGE)

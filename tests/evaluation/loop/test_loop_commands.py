@@ -80,7 +80,7 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, tmp_path,
     assert f"UDP 127.0.0.1:{port}" in capsys.readouterr().out
     logged = Trajectory.load(log)
     assert len(logged) == sum(found.states.values())
-    assert np.abs(logged.f_wanted[:, 1]).max() > 0.0
+    assert np.abs(logged.f_reference[:, 1]).max() > 0.0
     plan = make_plan(EvaluateCommand(replay=(log,), out=tmp_path / "out"))
     outcome = run_suite(plan.maneuvers, plan.policies, lambda maneuver, drives: None)
     assert list(outcome.maneuvers["log"]) == ["driven"]

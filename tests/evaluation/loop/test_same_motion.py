@@ -51,7 +51,15 @@ def assert_same_motion(bench: Bench, sent: np.ndarray, expected) -> None:
     np.testing.assert_array_equal(sent[:last, 27:33], expected.legs[1 : last + 1])
     assert np.abs(axes_of(expected)).max() > 0.01
     logged = bench.trajectory()
-    for name in ("carriage", "hexapod", "turntable", "f_felt", "w_felt", "f_wanted", "w_wanted"):
+    for name in (
+        "carriage",
+        "hexapod",
+        "turntable",
+        "f_simulator",
+        "w_simulator",
+        "f_reference",
+        "w_reference",
+    ):
         np.testing.assert_allclose(getattr(logged, name)[:last], getattr(expected, name)[:last], atol=1e-12)
 
 

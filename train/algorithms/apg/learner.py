@@ -25,7 +25,7 @@ from ....envs.task.options import PositiveCount
 from ....envs.task.unroll import TaskUnroll
 from ...agents import Network
 from ...config import TrainingConfig
-from ...networks import TORCH_ACTIVATIONS, Actor, standardise
+from ...networks import TORCH_ACTIVATIONS, Actor, standardize
 from ...optimizers import Descent
 from ...registry import Boundary, State, restoring
 from ...training import begin
@@ -51,7 +51,7 @@ class GradientHyperparameters:
         outlier: An environment's own gradient is shortened to so many times the median one's.
         offset: The cost of a drive counts relative to this plus what the drive usually costs: every drive by
             its relative gain, a wild one as much as a gentle one.
-        standardise: Whether the policy sees observations relative to mean and deviation under the first one,
+        standardize: Whether the policy sees observations relative to mean and deviation under the first one,
             and acts relative to what that does. None: if the training goes on from an agent; the spring that
             it begins with otherwise moves too little to be a measure.
         window: How far gradients are led, s; None: to the end of the episode.
@@ -65,7 +65,7 @@ class GradientHyperparameters:
     max_grad_norm: Positive = 1.0
     outlier: Positive = 2.0
     offset: Positive = 0.2
-    standardise: bool | None = None
+    standardize: bool | None = None
     window: Positive | None = None
     value: ValueOptions | None = None
 
@@ -102,8 +102,8 @@ class GradientLearner:
         size, actions = self.batch.layout.size, self.batch.action_size
         self.actor = Actor(size, actions, self.given.net_arch, self.given.activation_fn)
         begin(self.actor, self.batch, config)
-        if self.given.standardise or (self.given.standardise is None and config.initial is not None):
-            standardise(self.actor, self.batch, self._episode)
+        if self.given.standardize or (self.given.standardize is None and config.initial is not None):
+            standardize(self.actor, self.batch, self._episode)
             self.batch.seed(everywhere, seeds)
         given = self.given
         self._descent = Descent(self.actor, given.learning_rate, given.hidden_rate, given.max_grad_norm)

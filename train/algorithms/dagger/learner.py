@@ -19,7 +19,7 @@ from ....envs.platform.kernels.step import TURNTABLE
 from ....envs.settings import Positive, configuration, from_dict
 from ....envs.simulator.simulator import N_AXES
 from ....envs.task.batch import Batch
-from ....envs.task.environment import normalised
+from ....envs.task.environment import normalized
 from ....envs.task.options import PositiveCount
 from ...agents import Network
 from ...config import TrainingConfig
@@ -50,9 +50,9 @@ class Teacher:
     """
 
     def __init__(self, policy: str, batch: Batch) -> None:
-        if batch.options.randomisation.build is not None:
+        if batch.options.randomization.build is not None:
             raise ConfigurationError(
-                f"the teacher {policy} is made for one machine; leave randomisation.build out"
+                f"the teacher {policy} is made for one machine; leave randomization.build out"
             )
         self._batch = batch
         self._made = make_policy(policy, batch.platform)
@@ -99,7 +99,7 @@ class Teacher:
             turntable = np.asarray(motion["position"], dtype=np.float64)[:, TURNTABLE]
             yaw = np.asarray(motion["beta"], dtype=np.float64)[:, _YAW]
             accelerations = in_cab_frame(accelerations, turntable, yaw)
-        return np.clip(normalised(accelerations, batch.scale), -1.0, 1.0)
+        return np.clip(normalized(accelerations, batch.scale), -1.0, 1.0)
 
 
 def in_cab_frame(accelerations: Floats, turntable: Floats, yaw: Floats) -> Floats:

@@ -175,7 +175,7 @@ class _Writer:
         """Low-passed specific force."""
         for j, share in enumerate(shares):
             entry = self._layout.first("memory") + _CUES * j + force
-            self._gains[axis, entry] += gain * share * SCALES["wanted_force"]
+            self._gains[axis, entry] += gain * share * SCALES["reference_force"]
 
     def _carriage(self, w: LinearWashout) -> None:
         lead = w.leak + w.force_gain
@@ -201,7 +201,7 @@ class _Writer:
             force, per_force = (1, -w.stiffness / GRAVITY) if k == 0 else (0, w.stiffness / GRAVITY)
             self._add(axis, "rate_error", k, w.rate_gain)
             self._add(axis, "beta", k, -w.stiffness)
-            self._add(axis, "wanted_force", force, per_force * w.tilt_share)
+            self._add(axis, "reference_force", force, per_force * w.tilt_share)
             self._remember(axis, force, w.tilt_shares, per_force)
 
     def _spring(

@@ -166,7 +166,7 @@ def _noise(given: Mapping[str, Any], size: int) -> Any:
 
 _NUMBER: Final = (int, float, np.number)
 _INITIAL_WEIGHT: Final = 1e5
-"""Observations that the normalisation of an initial agent counts for."""
+"""Observations that the normalization of an initial agent counts for."""
 CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 
 
@@ -240,11 +240,11 @@ class SB3Learner:
         return {name: float(value) for name, value in values.items() if isinstance(value, _NUMBER)}
 
     def network(self) -> Network:
-        """The deterministic policy with its normalisation."""
+        """The deterministic policy with its normalization."""
         return network_of(self.model, self.normalize)
 
     def state(self) -> dict[str, Any]:
-        """Weights, optimizers, replay buffer, normalisation, environments, random generators, log."""
+        """Weights, optimizers, replay buffer, normalization, environments, random generators, log."""
         whole = state_of(self.model, self.simulators, self.normalize)
         return {**whole, "monitor": self.monitor.state(), "told": self._told()}
 

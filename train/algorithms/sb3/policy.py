@@ -74,7 +74,7 @@ _NAMES = {module: name for name, module in TORCH_ACTIVATIONS.items()}
 
 
 def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> Network:
-    """``model.predict(deterministic=True)`` with the normalisation before it.
+    """``model.predict(deterministic=True)`` with the normalization before it.
 
     Args:
         model: PPO, SAC, TD3, TQC, or another with their actor, on a flat observation.

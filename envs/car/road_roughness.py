@@ -36,7 +36,7 @@ _HEAVE: Final = (2.0 * np.pi * 1.3, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
-class Unevenness:
+class RoadRoughness:
     """Heights of the road under the wheels, m, positive upwards, every :data:`SPACING` of the way.
 
     Args:
@@ -48,7 +48,7 @@ class Unevenness:
     right: Floats
 
     @classmethod
-    def drawn(cls, roughness: float, length: float, rng: np.random.Generator) -> Unevenness:
+    def drawn(cls, roughness: float, length: float, rng: np.random.Generator) -> RoadRoughness:
         """Tracks of a roughness G(n0), m^3, over a length, m.
 
         Half of the spectrum is common to both, half is each track's own where waves are shorter than a car is
@@ -83,7 +83,7 @@ class Shaking:
     rate_derivative: Floats
 
 
-def shaking(car: Car, road: Unevenness, distance: Floats, dt: float) -> Shaking:
+def shaking(car: Car, road: RoadRoughness, distance: Floats, dt: float) -> Shaking:
     """What a road adds where the c.g. is at distances (n,), m, one a time step ``dt``, s.
 
     x forward, y right, z down; positive pitch lifts the nose, positive roll lowers the right side.
