@@ -3,4 +3,6 @@
 from .cues import GRAVITY, CueTrace
 from .registration import ENVIRONMENT_ID, register
 
-__all__ = ["ENVIRONMENT_ID", "GRAVITY", "CueTrace", "register"]
+register()
+
+__all__ = ["ENVIRONMENT_ID", "GRAVITY", "CueTrace"]

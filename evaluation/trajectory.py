@@ -89,8 +89,8 @@ class LimitTable:
 class Trajectory:
     """One drive of one policy. Row k is the machine at ``time[k]``; row 0 is the start, before any action.
 
-    Arrays are copied, checked and made read-only. Reference cues are those of the car, simulator cues those of
-    the cab, at its reference point (F_A and F_S) unless the head is named.
+    Arrays are copied, checked and made read-only. Reference cues are the car's, simulator cues those of
+    the cab, at its reference point (F_A, F_S) unless the head is named.
     x forward, y right, z down.
 
     Args:

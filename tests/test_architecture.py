@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -99,14 +98,3 @@ def test_no_import_goes_round_in_a_circle():
     # A package imports its modules to name them; what asks for one of them does not ask for the others.
     plain = {module: names for module, names in graph.items() if MODULES[module].name != "__init__.py"}
     assert list(TopologicalSorter(plain).static_order())
-
-
-@pytest.mark.parametrize("folder", sorted({path.parent.as_posix() for path in MODULES.values()}))
-def test_the_text_names_every_module(folder):
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if line.startswith(f"| `{folder}` |")]
-    assert len(rows) == 1, f"the table of docs/architecture.md needs one row for {folder}"
-    named = set(re.findall(r"`([a-z0-9_]+)`", rows[0].split("|", maxsplit=3)[3]))
-    files = {path.stem for path in MODULES.values() if path.parent.as_posix() == folder} - {"__init__"}
-    assert files - named == set(), f"the row of {folder} in docs/architecture.md does not name them"
-    assert named - files == set(), f"the row of {folder} in docs/architecture.md names what is gone"

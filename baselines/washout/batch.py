@@ -20,7 +20,7 @@ from ...envs.simulator.kernels.gradient import add_cue_error, step_with_adjoint
 from ...envs.simulator.kernels.step import CueCost, State, zone
 from ...envs.simulator.simulator import Simulator
 from .kernels.blocks import Memory
-from .kernels.step import Score, act
+from .kernels.launch import Score, act
 from .policy import CLASSICAL, Family, FamilyParameters, start_pose
 
 Floats = NDArray[np.float64]

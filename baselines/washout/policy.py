@@ -18,7 +18,8 @@ from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
 from ..policy import Array, checked_episode_start, checked_observation, wrong_state
 from .kernels.blocks import HighPassParameters, Memory, Parameters, initial_memory
-from .kernels.step import drive_kernel, predict_kernel, washout
+from .kernels.launch import drive_kernel, predict_kernel
+from .kernels.step import washout
 from .parameters import HighPass, LowPass, TiltCoordination, WashoutParameters, load_washout
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
-from ..car.vehicles import Car
 from ..cues import GRAVITY
+from .vehicles import Car
 
 Floats = NDArray[np.float64]
 

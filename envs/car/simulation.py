@@ -151,7 +151,7 @@ def _trace(plan: Plan, rows: Floats) -> CueTrace:
     force, rate, rate_derivative = rows[:, 0:3], rows[:, 3:6], rows[:, 6:9]
     if plan.roughness is not None:
         distance = np.cumsum(DT * rows[:, 9 + _SPEED])
-        added = shaking(plan.car, plan.unevenness, distance, DT)
+        added = shaking(plan.car, plan.roughness, distance, DT)
         force, rate = force + added.force, rate + added.rate
         rate_derivative = rate_derivative + added.rate_derivative
     return CueTrace(

@@ -21,7 +21,7 @@ from motion_cueing.baselines.washout import (
     washout_presets,
 )
 from motion_cueing.baselines.washout.families import family_presets
-from motion_cueing.baselines.washout.kernels.step import Memory
+from motion_cueing.baselines.washout.kernels.blocks import Memory
 from motion_cueing.baselines.washout.optimal import load_optimal
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.platform import get_platform

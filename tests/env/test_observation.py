@@ -99,10 +99,10 @@ def test_preview_is_the_drive_ahead_and_its_last_cue_after_its_end(steps):
 def test_perceived_rows_are_what_is_sensed():
     env, observation = moved(observation=ObservationOptions(perceived=True))
     state = env.batch.simulator.state[0]
-    for side in ("reference_cue", "simulator_cue"):
-        sensed = state[f"sensed_{side}"]
-        assert close(row(env, observation, f"sensed_{side}_force"), sensed["force"] + GRAVITY)
-        assert close(row(env, observation, f"sensed_{side}_rate"), sensed["rate"])
+    for side in ("reference", "simulator"):
+        sensed = state[f"perceived_{side}"]
+        assert close(row(env, observation, f"perceived_{side}_force"), sensed["force"] + GRAVITY)
+        assert close(row(env, observation, f"perceived_{side}_rate"), sensed["rate"])
         assert np.abs(sensed["rate"]).max() > 1e-3
 
 

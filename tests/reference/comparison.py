@@ -48,8 +48,8 @@ def differences(kernel: Rows, reference: ReferenceState) -> dict[str, float]:
         for field in ("position", "rate", "pose", "pose_rate"):
             pairs[f"{name}.{field}"] = getattr(found, field), getattr(motion, field)
     for name, cues in (
-        ("reference_cue", reference.reference_cue),
-        ("simulator_cue", reference.simulator_cue),
+        ("reference_cue", reference.reference),
+        ("simulator_cue", reference.simulated),
     ):
         for field, values in zip(CUES, cues, strict=True):
             pairs[f"{name}.{field}"] = kernel[name][field], values

@@ -32,8 +32,8 @@ class ReferenceState:
     acceleration: Floats
     reference: tuple[Floats, Floats, Floats]
     simulated: tuple[Floats, Floats, Floats]
-    modes_wanted: Floats
-    modes_felt: Floats
+    modes_reference: Floats
+    modes_simulated: Floats
     perceived_reference: Floats
     perceived_simulator: Floats
 
@@ -65,7 +65,7 @@ class ReferenceSimulator:
         motion = MotionState(position, np.zeros((self.n, 9)), start[:, 2:8].copy(), np.zeros((self.n, 6)))
         sample = np.zeros(self.n, dtype=int)
         reference, simulated = (
-            self.reference_cue(sample),
+            self.reference(sample),
             simulator_cues(self.machine, motion, np.zeros((self.n, 9))),
         )
         modes = [self.perception.rest(heard(cues)) for cues in (reference, simulated)]
@@ -91,11 +91,11 @@ class ReferenceSimulator:
         motion = setpoint if self.unity else self.actuate(old.motion)
         acceleration = (motion.axis_rates() - old.motion.axis_rates()) / self.dt
         sample = old.sample + 1
-        reference, simulated = self.reference_cue(sample), simulator_cues(self.machine, motion, acceleration)
+        reference, simulated = self.reference(sample), simulator_cues(self.machine, motion, acceleration)
         modes, sensed = [], []
         for begin, before, after in (
-            (old.modes_wanted, old.reference_cue, reference),
-            (old.modes_felt, old.simulator_cue, simulated),
+            (old.modes_reference, old.reference, reference),
+            (old.modes_simulated, old.simulated, simulated),
         ):
             modes.append(self.perception.advance(begin, heard(before), heard(after)))
             sensed.append(self.perception.sensed(modes[-1], heard(after)))

@@ -1,0 +1,136 @@
+"""Washouts as kernels: accelerations from observations, fused with the machine; one with its adjoint.
+
+The kernels are made for the structs and the step of a washout. Warp reads their annotations, so this module
+must not keep them as text.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from ....envs.arrays import real, vec9
+from ....envs.perception.kernels import Vestibular
+from ....envs.platform.kernels.step import Machine, SetPoint
+from ....envs.simulator.kernels.step import Drives, State, Zone, cue_error, next_state, perceived_error
+from .blocks import Memory, Parameters, initial_memory, read_observation, read_state
+from .step import washout
+
+
+@wp.struct
+class Score:
+    """Means over a drive."""
+
+    cue_error: real  # J
+    perceived_error: real
+    at_limit: real  # share of the steps in which a limit is met
+
+
+@wp.func
+def mean_score(cue_error: real, perceived_error: real, limited: real, count: real) -> Score:
+    """A score of sums over ``count`` samples."""
+    result = Score()
+    result.cue_error = cue_error / count
+    result.perceived_error = perceived_error / count
+    result.at_limit = limited / count
+    return result
+
+
+def predict_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
+    """A kernel: accelerations for a batch of observations; memories begin anew where an episode has begun.
+
+    Args:
+        Parameters: Struct of a parameter set.
+        Memory: Struct of the filters' states.
+        begin: (parameters, reading) -> memory when an episode begins.
+        step: (parameters, memory, reading, dt) -> a struct with ``action`` and ``memory``.
+    """
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def predict(
+        parameters: wp.array(dtype=Parameters),
+        parameters_of: wp.array(dtype=int),
+        observation: wp.array2d(dtype=real),
+        begins: wp.array(dtype=wp.bool),
+        memory: wp.array(dtype=Memory),
+        dt: real,
+        memory_out: wp.array(dtype=Memory),
+        action: wp.array(dtype=vec9),
+    ) -> None:
+        i = wp.tid()
+        p = parameters[parameters_of[i]]
+        seen = read_observation(observation, i)
+        m = memory[i]
+        if begins[i]:
+            m = begin(p, seen)
+        out = step(p, m, seen, dt)
+        memory_out[i] = out.memory
+        action[i] = out.action
+
+    return predict
+
+
+def drive_kernel(Parameters: Any, begin: Any, step: Any) -> Any:
+    """A kernel: algorithm and machine through whole drives in one launch, environment ``first`` and on.
+
+    Arguments as in :func:`predict_kernel`.
+    """
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def drive_through(
+        machines: wp.array(dtype=Machine),
+        vestibular: wp.array(dtype=Vestibular),
+        drives: Drives,
+        machine_of: wp.array(dtype=int),
+        drive_of: wp.array(dtype=int),
+        dt: real,
+        delay: wp.array2d(dtype=SetPoint),
+        parameters: wp.array(dtype=Parameters),
+        parameters_of: wp.array(dtype=int),
+        z: Zone,
+        initial: wp.array(dtype=State),
+        first: int,
+        score: wp.array(dtype=Score),
+    ) -> None:
+        i = first + wp.tid()
+        p = parameters[parameters_of[i]]
+        m = machines[machine_of[i]]
+        state = initial[i]
+        memory = begin(p, read_state(state))
+        count = drives.length[drive_of[i]]
+        cue = cue_error(z, state)
+        perceived = perceived_error(z, state)
+        limited = real(0.0)
+        for _ in range(1, count):
+            out = step(p, memory, read_state(state), dt)
+            memory = out.memory
+            state = next_state(m, vestibular[0], drives, drive_of[i], delay, i, state, out.action, dt)
+            cue = cue + cue_error(z, state)
+            perceived = perceived + perceived_error(z, state)
+            if state.limits != wp.uint64(0):
+                limited = limited + real(1.0)
+        score[i] = mean_score(cue, perceived, limited, real(count))
+
+    return drive_through
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def act(
+    parameters: wp.array(dtype=Parameters),
+    parameters_of: wp.array(dtype=int),
+    state: wp.array(dtype=State),
+    memory: wp.array(dtype=Memory),
+    begins: int,
+    dt: real,
+    memory_out: wp.array(dtype=Memory),
+    action: wp.array(dtype=vec9),
+) -> None:
+    """The washout on the simulator's own state, with its adjoint; memories begin anew where ``begins``."""
+    i = wp.tid()
+    p = parameters[parameters_of[i]]
+    seen = read_state(state[i])
+    m = memory[i]
+    if begins != 0:
+        m = initial_memory(p, seen)
+    out = washout(p, m, seen, dt)
+    memory_out[i] = out.memory
+    action[i] = out.action
