@@ -30,11 +30,17 @@ class ActionError(MotionCueingError, ValueError):
 
 
 class UnknownNameError(MotionCueingError, KeyError):
-    """A name that is not registered; the message lists the nearest known ones."""
+    """A name that is not registered; the message lists the nearest known ones, or the new name of an old one."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(
+        self, kind: str, name: str, known: Iterable[str], renamed: Mapping[str, str] | None = None
+    ) -> None:
         self.kind, self.name, self.known = kind, name, sorted(known)
-        super().__init__(f"unknown {kind} {name!r}. {suggest(name, self.known)}")
+        new = (renamed or {}).get(name)
+        if new is None:
+            super().__init__(f"unknown {kind} {name!r}. {suggest(name, self.known)}")
+        else:
+            super().__init__(f"unknown {kind} {name!r}; it is called {new!r} now")
 
     def __str__(self) -> str:
         # KeyError would show the repr of the message.

@@ -1,0 +1,118 @@
+"""Registries: policies, maneuvers, platforms, cars and algorithms by name, open to other packages.
+
+A name is registered by a call, or by an entry point of an installed package::
+
+    [project.entry-points."motion_cueing.policies"]
+    my-controller = "my_package.controller:make"
+
+Items may be given as ``"module:attribute"``. Such a module is imported when its item is asked for, so that a list
+of names costs no import.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any, Generic, TypeVar
+
+from .errors import ConfigurationError, UnknownNameError
+
+T = TypeVar("T")
+
+
+@dataclass
+class _Entry:
+    """One name: its description, and its item or ``"module:attribute"``."""
+
+    item: Any
+    description: str
+
+
+class Registry(Generic[T]):
+    """Items of one kind by name.
+
+    Args:
+        kind: What is registered, for messages: "policy".
+        group: Group of entry points by which installed packages take part: "motion_cueing.policies".
+        renamed: Names of earlier versions and what they are called now.
+    """
+
+    def __init__(self, kind: str, group: str, renamed: Mapping[str, str] | None = None) -> None:
+        self.kind, self.group = kind, group
+        self._renamed = dict(renamed or {})
+        self._entries: dict[str, _Entry] = {}
+        self._discovered = False
+
+    def register(self, name: str, item: T | str, description: str = "", *, replace: bool = False) -> None:
+        """Register an item.
+
+        Args:
+            name: Its name.
+            item: The item, or ``"module:attribute"`` where to find it.
+            description: One line for lists.
+            replace: Whether a name that is taken is given to the new item.
+
+        Raises:
+            ConfigurationError: the name is empty, looks like a file, or is taken.
+        """
+        if not isinstance(name, str) or not name or any(mark in name for mark in "/\\. \t\n"):
+            raise ConfigurationError(
+                f"{self.kind}: the name {name!r} is not one word without dots and slashes, such as 'my-{self.kind}'"
+            )
+        if name in self._entries and not replace:
+            raise ConfigurationError(
+                f"{self.kind} {name!r} is registered already; choose another name or pass replace=True"
+            )
+        self._entries[name] = _Entry(item, description)
+
+    def names(self) -> list[str]:
+        """All names, in the order of registration."""
+        self._discover()
+        return list(self._entries)
+
+    def description(self, name: str) -> str:
+        """One line about an item."""
+        return self._entry(name).description
+
+    def __contains__(self, name: object) -> bool:
+        self._discover()
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names())
+
+    def __getitem__(self, name: str) -> T:
+        """The item of a name.
+
+        Raises:
+            UnknownNameError: nothing has this name; the message says what is near, or the new name of an old one.
+            ConfigurationError: the module of the item cannot be imported.
+        """
+        entry = self._entry(name)
+        if isinstance(entry.item, str):
+            module, _, attribute = entry.item.partition(":")
+            try:
+                entry.item = getattr(import_module(module), attribute)
+            except (ImportError, AttributeError) as error:
+                raise ConfigurationError(
+                    f"{self.kind} {name!r}: {entry.item} cannot be loaded ({error})"
+                ) from error
+        return entry.item  # type: ignore[no-any-return]
+
+    def _entry(self, name: str) -> _Entry:
+        self._discover()
+        if name not in self._entries:
+            raise UnknownNameError(self.kind, str(name), self._entries, self._renamed)
+        return self._entries[name]
+
+    def _discover(self) -> None:
+        """Take the entry points of installed packages in, once; names of this project keep their items."""
+        if self._discovered:
+            return
+        self._discovered = True
+        for point in entry_points(group=self.group):
+            package = point.dist.name if point.dist else "another package"
+            if point.name not in self._entries:
+                self.register(point.name, point.value, f"from {package}")
