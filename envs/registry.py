@@ -5,8 +5,8 @@ A name is registered by a call, or by an entry point of an installed package::
     [project.entry-points."motion_cueing.policies"]
     my-controller = "my_package.controller:make"
 
-Items may be given as ``"module:attribute"``. Such a module is imported when its item is asked for, so that a list
-of names costs no import.
+Items may be given as ``"module:attribute"``. Such a module is imported when its item is asked for, so that a
+list of names costs no import.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ class Registry(Generic[T]):
         """
         if not isinstance(name, str) or not name or any(mark in name for mark in "/\\. \t\n"):
             raise ConfigurationError(
-                f"{self.kind}: the name {name!r} is not one word without dots and slashes, such as 'my-{self.kind}'"
+                f"{self.kind}: the name {name!r} is not one word without dots and slashes, "
+                f"such as 'my-{self.kind}'"
             )
         if name in self._entries and not replace:
             raise ConfigurationError(
@@ -87,7 +88,7 @@ class Registry(Generic[T]):
         """The item of a name.
 
         Raises:
-            UnknownNameError: nothing has this name; the message says what is near, or the new name of an old one.
+            UnknownNameError: nothing has this name; the message has near names, or the new name of an old one.
             ConfigurationError: the module of the item cannot be imported.
         """
         entry = self._entry(name)
