@@ -30,7 +30,7 @@ class ActionError(MotionCueingError, ValueError):
 
 
 class UnknownNameError(MotionCueingError, KeyError):
-    """A name that is not registered; the message has the nearest known ones, or the new name of an old one."""
+    """A name that is not registered; the message has near ones, or the new name of an old one."""
 
     def __init__(
         self, kind: str, name: str, known: Iterable[str], renamed: Mapping[str, str] | None = None

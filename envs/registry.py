@@ -88,7 +88,7 @@ class Registry(Generic[T]):
         """The item of a name.
 
         Raises:
-            UnknownNameError: nothing has this name; the message has near names, or the new name of an old one.
+            UnknownNameError: it is not registered; the message has near names, or the new name.
             ConfigurationError: the module of the item cannot be imported.
         """
         entry = self._entry(name)
