@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("baselines", "envs", "evaluation", "train")
+PACKAGES = ("baselines", "cli", "envs", "evaluation", "realtime", "train")
 
 
 def package_files() -> list[Path]:
