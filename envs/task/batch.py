@@ -32,7 +32,7 @@ from .kernels.observation import (
     start_poses,
     start_samples,
 )
-from .kernels.reward import reward_scale, vec_terms
+from .kernels.reward import reward_of, vec_terms
 from .observation import Layout, ability_of, action_scale, free_axes, layout_of, low_passed, velocity_scale
 from .options import ActionOptions, TaskOptions
 
@@ -122,7 +122,7 @@ def rules_of(
     """What is the same for a whole batch, as the kernels read it."""
     rules: Any = Rules()
     rules.action = _actions(platforms, options.action, device)
-    rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
+    rules.reward = reward_of(options.reward, options.episode.terminate_on_failure)
     rules.places = places_of(layout, options.observation, dt, options.randomization)
     if options.observation.machine:
         abilities = np.array([ability_of(platform) for platform in platforms])

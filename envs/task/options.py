@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
@@ -15,8 +14,8 @@ from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, platform_names
 from ..platform.randomization import PlatformRanges
-from ..settings import NonNegative, Positive, Vector2, Vector3, configuration, renamed
-from ..simulator.kernels.step import CueCost
+from ..settings import NonNegative, Positive, Vector2, configuration, renamed
+from .kernels.reward import RewardOptions
 
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
@@ -98,55 +97,6 @@ class ActionOptions:
 
     def __post_init__(self) -> None:
         _check_names("axis", self.frozen, AXES)
-
-
-@configuration
-class RewardWeights:
-    """Weight of each term of the reward, which is minus their weighted sum; 0 switches a term off.
-
-    Args:
-        cue_error: Error of the cues at the cab, whose mean over a drive is J.
-        perceived_error: The same of what the driver senses.
-        false_cues: The part of ``cue_error`` on axes that move where the car does not, or against it.
-        tilt_rate: Square of the roll and pitch rate beyond the car's own, above the threshold, in thresholds.
-        stroke: Square of the use of travel beyond a margin, summed over actuators; 1 at an end of travel.
-        limits: Share of the actuators held back by a limit.
-        action_rate: Mean square change of the action.
-        failure: 1 where the episode is terminated.
-    """
-
-    cue_error: NonNegative = 1.0
-    perceived_error: NonNegative = 0.0
-    false_cues: NonNegative = 0.0
-    tilt_rate: NonNegative = 0.02
-    stroke: NonNegative = 0.1
-    limits: NonNegative = 0.1
-    action_rate: NonNegative = 0.02
-    failure: NonNegative = 100.0
-
-
-@configuration
-class RewardOptions:
-    """The reward's weights, scales and thresholds.
-
-    Args:
-        weights: Of its terms.
-        zone: Indifference zone of the cue errors.
-        force_threshold: Perception of specific force x, y, z, m/s^2 (Reid and Nahon, from memory).
-        rate_threshold: Perception of angular velocity x, y, z, rad/s (Zacharias; 3.0, 3.6, 2.6 deg/s).
-        tilt_rate: Tilt rate that goes unnoticed, rad/s (3 deg/s, SIMONA).
-        stroke_margin: Share of the travel that costs nothing.
-        stroke_braking: Travel counts where an actuator would come to a stop with this share of its
-            acceleration, so that what lies beyond a short horizon costs now; None: where it is.
-    """
-
-    weights: RewardWeights = RewardWeights()
-    zone: CueCost = CueCost()
-    force_threshold: Vector3 = (0.17, 0.17, 0.28)
-    rate_threshold: Vector3 = (math.radians(3.0), math.radians(3.6), math.radians(2.6))
-    tilt_rate: Positive = math.radians(3.0)
-    stroke_margin: Share = 0.8
-    stroke_braking: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
 
 
 @configuration

@@ -16,8 +16,8 @@ from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.kernels.step import State
 from ..simulator.simulator import Snapshot, bytes_of, put_bytes
 from .batch import Batch
+from .kernels.episode import look_with_adjoint, play_with_adjoint
 from .kernels.reward import vec_terms
-from .kernels.unroll import look_with_adjoint, play_with_adjoint
 
 _MODES: Final = ("acceleration", "jerk", "velocity")
 

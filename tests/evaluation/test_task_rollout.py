@@ -24,7 +24,7 @@ from motion_cueing.envs.task.environment import normalized
 from motion_cueing.envs.task.observation import acceleration_scale, layout_of
 from motion_cueing.evaluation import Trajectory, rollout
 
-from ..env.tasks import drive
+from ..envs.task.tasks import drive
 
 SCALE = acceleration_scale(get_platform("paper"))
 

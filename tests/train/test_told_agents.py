@@ -23,7 +23,7 @@ from motion_cueing.train.config import load_config, validation_task
 from motion_cueing.train.networks import Actor, begin_at_rest, standardize
 from motion_cueing.train.validation import Validation
 
-from ..env.tasks import drive
+from ..envs.task.tasks import drive
 from . import tiny
 from .agents import agent
 

@@ -10,7 +10,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
 from motion_cueing.evaluation.endurance.checks import KINDS, TOLERANCE, TrueLimits, legs_of
 
-from ...platform.machines_under_test import PRESETS
+from ...envs.platform.platforms_under_test import PRESETS
 from ...reference import MachineModel
 from ...reference import kinematics as plain
 from ..studies import PAPER, bend

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..reference import frames as plain
+from ...reference import frames as plain
 from .probes import frame_rows, tilt_rows
 
 H = 1e-6

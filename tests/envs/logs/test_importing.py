@@ -46,7 +46,7 @@ def assert_recovered(result: ImportedLog, truth: Truth, force: float, rate: floa
     np.testing.assert_allclose(trace.angular_velocity[INSIDE], wanted[1][INSIDE], atol=rate)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     roll=ANGLE,
     pitch=st.floats(-1.5, 1.5),

@@ -10,9 +10,9 @@ from motion_cueing.envs.platform import Platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.simulator.simulator import Simulator
 
-from ..reference import ReferenceSimulator
-from ..reference.comparison import adopt, differences, restless_drive
-from .machines_under_test import PRESETS, sluggish, with_dynamics
+from ...reference import ReferenceSimulator
+from ...reference.comparison import adopt, differences, restless_drive
+from .platforms_under_test import PRESETS, sluggish, with_dynamics
 
 AGREE = 1e-9  # SI units, every field
 DRIVE = restless_drive(2101)

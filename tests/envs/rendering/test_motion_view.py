@@ -19,7 +19,7 @@ from motion_cueing.envs.rendering.motion_view import (
     turntable_frame,
 )
 
-from ..reference import frames
+from ...reference import frames
 from .moments import moment
 
 angles = st.floats(-0.4, 0.4)

@@ -23,7 +23,7 @@ from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.platform.presets import neutral_height, paired_hexapod
 from motion_cueing.envs.settings import save, to_dict
 
-from .machines_under_test import PRESETS, sluggish
+from .platforms_under_test import PRESETS, sluggish
 
 
 def broken(**fields) -> dict:

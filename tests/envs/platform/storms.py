@@ -12,10 +12,10 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import Platform, actuator_limits
 from motion_cueing.envs.simulator.simulator import Simulator
 
-from ..reference import MachineModel
-from ..reference.comparison import motion_of
-from ..reference.kinematics import clearance, extensions
-from .machines_under_test import DT
+from ...reference import MachineModel
+from ...reference.comparison import motion_of
+from ...reference.kinematics import clearance, extensions
+from .platforms_under_test import DT
 
 STANDSTILL = CueTrace("standstill", DT * np.arange(3), np.tile([0.0, 0.0, -9.81], (3, 1)), np.zeros((3, 3)))
 CLOSES = 1e-11

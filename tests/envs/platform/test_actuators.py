@@ -12,9 +12,9 @@ from motion_cueing.envs.platform import legs_of_pose
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.platform.kernels.step import lag_transition
 
-from ..reference.actuators import lag
-from ..reference.comparison import bits
-from .machines_under_test import DT, PRESETS, with_dynamics
+from ...reference.actuators import lag
+from ...reference.comparison import bits
+from .platforms_under_test import DT, PRESETS, with_dynamics
 from .storms import simulator
 
 N_STEPS = 120
@@ -54,7 +54,7 @@ def test_a_lagging_carriage_solves_its_differential_equation(damping):
         np.testing.assert_allclose(found, y, atol=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     omega=st.floats(0.5, 200.0),
     damping=st.one_of(st.just(1.0), st.floats(1.01, 5.0)),

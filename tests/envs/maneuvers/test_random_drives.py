@@ -81,7 +81,7 @@ def test_urban_drives_stop_and_turn_both_ways(batches):
     assert side.min() < -2.0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(2.0, 40.0),

@@ -13,7 +13,7 @@ from motion_cueing.envs.errors import ActionError, ConfigurationError, DataError
 from motion_cueing.envs.platform import Cab, get_platform
 from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
 
-from .reference.comparison import bits
+from ...reference.comparison import bits
 
 REST = np.array([0.0, 0.0, -9.81])
 PLATFORMS = [get_platform(name) for name in ("paper", "24-inch", "nads-1")]

@@ -186,7 +186,7 @@ def test_resampling_to_more_samples_than_memory_holds(step: float) -> None:
         CueTrace(**fields()).resampled(step)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     arrays(np.float64, (6, 7), elements=st.floats(-100.0, 100.0, allow_subnormal=False)),
     st.sampled_from(["", ".gz"]),

@@ -10,7 +10,7 @@ import pytest
 from motion_cueing.envs.platform import Platform, actuator_limits
 from motion_cueing.envs.platform.kernels import ACTUATORS, AXES
 
-from .machines_under_test import DT, PRESETS
+from .platforms_under_test import DT, PRESETS
 from .storms import simulator
 
 END, VELOCITY, ACCELERATION, SINGULAR = 1, 2, 4, 8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
@@ -14,7 +14,6 @@ from motion_cueing.evaluation.metrics import cue_error
 from .moments import DT, weaving
 
 
-@settings(deadline=None)
 @given(st.integers(0, 400), st.floats(0.05, 1.5))
 def test_the_last_seconds_are_kept_in_order(samples, window):
     history = CueHistory("m", "p", DT, window=window)

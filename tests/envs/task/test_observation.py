@@ -252,7 +252,7 @@ def test_noise_differs_from_step_to_step_and_from_episode_to_episode():
 
 def documented_rows() -> list[tuple[str, ...]]:
     """Name, entries, unit, scale and bound of every row of the page's tables."""
-    page = (Path(__file__).parents[2] / "docs" / "environment.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "environment.md").read_text(encoding="utf-8")
     lines = [line.split("|") for line in page.splitlines() if line.startswith("| `")]
     return [tuple(cell.strip().strip("`") for cell in line[1:6]) for line in lines if len(line) == 8]
 

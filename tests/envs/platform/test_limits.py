@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motion_cueing.envs.platform import Platform
 
-from .machines_under_test import PRESETS, sluggish
+from .platforms_under_test import PRESETS, sluggish
 from .storms import Watch, every_direction, simulator, storm
 
 EXACT = 1e-9
@@ -31,14 +31,14 @@ def weather(platform: Platform, scale: float, seed: int, steps: int, tolerance: 
 
 # 4 presets x 6 examples x 256 sequences = 6144 random sequences, each of 250 steps.
 @pytest.mark.parametrize("name", PRESETS)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(scale=SCALES, seed=st.integers(0, 2**32 - 1))
 def test_random_commands_break_no_limit(name, scale, seed):
     weather(PRESETS[name], scale, seed, steps=250, tolerance=EXACT)
 
 
 @pytest.mark.parametrize("name", PRESETS)
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=2)
 @given(scale=SCALES, seed=st.integers(0, 2**32 - 1))
 def test_random_commands_break_no_limit_with_lag_and_dead_time(name, scale, seed):
     weather(sluggish(PRESETS[name]), scale, seed, steps=150, tolerance=LAGGED)

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from motion_cueing.envs.errors import DataError, GeometryError
 from motion_cueing.envs.platform import Platform, legs_of_pose, pose_of_legs
 
-from ..reference import MachineModel
-from ..reference import kinematics as plain
-from .machines_under_test import PRESETS
+from ...reference import MachineModel
+from ...reference import kinematics as plain
+from .platforms_under_test import PRESETS
 from .probes import leg_rows
 
 # Poses within every preset's reach: share of the stroke, and rad.
@@ -43,7 +43,7 @@ def test_lengths_are_distances_between_joints(platform):
         np.testing.assert_allclose(legs_of_pose(legs, pose), distance - legs.neutral_lengths, atol=1e-14)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(name=st.sampled_from(list(PRESETS)), share=st.tuples(*[unit] * 6))
 def test_forward_kinematics_undoes_inverse_kinematics(name, share):
     legs, pose = PRESETS[name].hexapod, within(PRESETS[name], np.array(share))

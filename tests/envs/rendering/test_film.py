@@ -15,7 +15,7 @@ from motion_cueing.envs.rendering import Renderer
 from motion_cueing.evaluation.metrics import measure
 from motion_cueing.evaluation.reporting.film import check_suffix, film_frames, frame_rows, gif_rate, save_film
 
-from ..evaluation.synthetic import drive, trajectory
+from ...evaluation.synthetic import drive, trajectory
 from .moments import SIZE
 
 

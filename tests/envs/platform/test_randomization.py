@@ -15,7 +15,7 @@ from motion_cueing.envs.platform.kinematics import legs_of_pose, pose_of_legs
 from motion_cueing.envs.platform.parameters import axis_reach, machine_parameters
 from motion_cueing.envs.platform.randomization import PlatformRanges, random_platform, resized
 
-from .machines_under_test import DT, PRESETS
+from .platforms_under_test import DT, PRESETS
 
 PAPER = PRESETS["paper"]
 WIDE = PlatformRanges(
@@ -59,7 +59,7 @@ def test_reach_ends_where_a_leg_does_or_near_a_singular_pose(name):
             assert at_its_end or clearance(hexapod, poses[-1]) == pytest.approx(0.15, rel=1e-3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.2, 4.0), st.sampled_from(["dim-hexapod", "24-inch"]))
 def test_a_hexapod_of_another_size_is_similar(size, name):
     """Where the origin of F_H is the middle of its joints, as here; angles are about that origin."""
@@ -83,7 +83,7 @@ def test_each_factor_of_shape_changes_its_part():
     assert other.extension == own.extension
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**31), st.sampled_from(list(PRESETS)))
 def test_every_drawn_machine_closes_at_neutral_and_moves(seed, name):
     own = PRESETS[name]
