@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ConfigurationError
 from ..platform.kernels.step import AXES
 from ..simulator.simulator import Snapshot
-from .options import Mode
+from .kernels.action import Mode
 
 Array = NDArray[Any]
 

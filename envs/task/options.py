@@ -10,11 +10,12 @@ from pydantic import Field
 from ..errors import UnknownNameError
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..perception.models import vestibular_model_names
-from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, platform_names
 from ..platform.randomization import PlatformRanges
 from ..settings import NonNegative, Positive, Vector2, configuration, renamed
+from .kernels.action import ActionOptions
+from .kernels.observation import ObservationOptions
 from .kernels.reward import RewardOptions
 
 Count = Annotated[int, Field(ge=0)]
@@ -35,68 +36,6 @@ def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
 def _check_range(name: str, limits: Vector2) -> None:
     if limits[0] > limits[1]:
         raise ValueError(f"{name} must be a range from low to high, found {list(limits)}")
-
-
-@configuration
-class ObservationOptions:
-    """What the observation holds beside its fixed rows.
-
-    Args:
-        preview: Samples of the car's cues ahead.
-        preview_spacing: Time between them, s; rounded to whole time steps.
-        perceived: Whether the signals the driver senses, in the car and in the simulator, are added.
-        true_motion: Whether the machine's true motion is added; it differs from the set-points where
-            actuators lag.
-        stack: Observations in one, the newest first; 1 for no stacking.
-        memory: Time constants of first-order low-passes of the car's cues, s: what a policy without a memory
-            of its own knows of the past.
-        frame: Axes of the machine's rows: "machine", or "cab": turned with the cab's heading, so that what
-            is ahead of the driver looks the same wherever the turntable stands.
-        machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
-            A policy that is told this runs on any machine.
-        simulator_cue: Source of the rows of simulator cues. "machine": true motion, by its sensors. "model":
-            those of the set-points, which a controller works out by itself. A policy that sees the second
-            has no loop through the actuators, so their lag and dead time cannot make it swing.
-    """
-
-    preview: Count = 0
-    preview_spacing: Positive = 0.2
-    perceived: bool = False
-    true_motion: bool = False
-    stack: PositiveCount = 1
-    memory: tuple[Positive, ...] = ()
-    frame: Frame = "machine"
-    machine: bool = False
-    simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
-
-
-@configuration
-class ActionOptions:
-    """What an action means; always a number in [-1, 1] for each entry.
-
-    Args:
-        mode: "acceleration": of the nine axes. "jerk": their rate of change. "velocity": the speed to
-            reach, as fast as ``authority`` lets. "residual": an acceleration added to that of the base
-            policy. "gains": the parameters of the base policy.
-        authority: Largest acceleration, as a share of what the machine can do on the axis alone.
-        largest: What that is a share of instead, m/s^2 and rad/s^2 in the order of ``AXES``: then an action
-            asks for the same of every machine, which gives as much as it can.
-        rise_time: Time in which full jerk takes an acceleration from zero to its largest value, s.
-        frozen: Axes that do not move, by name.
-        repeat: Time steps for which an action is held; rewards are averaged over them.
-        frame: Axes of carriage, displacement and tilt: "machine", or "cab": turned with the cab's heading.
-    """
-
-    mode: Mode = "acceleration"
-    authority: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    largest: Annotated[tuple[Positive, ...], Field(min_length=9, max_length=9)] | None = None
-    rise_time: Positive = 0.2
-    frozen: tuple[str, ...] = ()
-    repeat: PositiveCount = 1
-    frame: Frame = "machine"
-
-    def __post_init__(self) -> None:
-        _check_names("axis", self.frozen, AXES)
 
 
 @configuration

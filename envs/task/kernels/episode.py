@@ -13,7 +13,7 @@ from ...platform.kernels.step import Machine, SetPoint
 from ...simulator.kernels.observation import write_observation
 from ...simulator.kernels.step import Drives, State, next_state, shift_delay
 from .action import ActionScale, applied_accelerations, own_accelerations, take_action
-from .observation import Episode, Places, repeat_frame, shift_frames, write_frame
+from .observation import Episode, View, repeat_frame, shift_frames, write_frame
 from .reward import Reward, action_terms, end_terms, state_terms, vec_terms
 
 CORE = wp.constant(1)
@@ -27,7 +27,7 @@ class Rules:
 
     action: ActionScale
     reward: Reward
-    places: Places
+    view: View
     share: real  # of a time step in an action
     dt: real  # time step, s
 
@@ -113,9 +113,9 @@ def look_at(
         write_observation(m, s, s.setpoint, s.acceleration, s.simulator_cue, a.core, i)
     if parts & FRAME:
         command = a.command[i]
-        shift_frames(a.observation, i, rules.places.frame)
+        shift_frames(a.observation, i, rules.view.frame)
         write_frame(
-            rules.places,
+            rules.view,
             drives,
             drive,
             a.episode[i],
@@ -184,7 +184,7 @@ def look(
     which = machine_of[i]
     look_at(rules, a, drives, drive_of[i], which, machines[which], state[i], i, parts)
     if begins and parts & FRAME:
-        repeat_frame(a.observation, i, rules.places.frame)
+        repeat_frame(a.observation, i, rules.view.frame)
 
 
 @wp.kernel(enable_backward=False, module="unique")
@@ -264,7 +264,7 @@ def look_with_adjoint(
     """Observations before an action; ``now`` is the last one."""
     i = wp.tid()
     write_frame(
-        rules.places,
+        rules.view,
         drives,
         drive_of[i],
         episodes[i],

@@ -68,7 +68,7 @@ def term(weight: float, of: Of = "state") -> Callable[[Any], Any]:
     """Declare a Warp function to be a term of the reward; the decorator, see :class:`Term`."""
 
     def declare(function: Any) -> Any:
-        about = " ".join(function.func.__doc__.split())
+        about = " ".join(function.func.__doc__.split()).replace("``", "`")
         _DECLARED.append(Term(function.func.__name__, about, weight, of, function))
         return function
 
@@ -203,16 +203,15 @@ if TYPE_CHECKING:
         def __getattr__(self, name: str) -> float: ...
 
 else:
-    _ABOUT = "\n".join(f"    {one.name}: {one.about}" for one in DECLARED)
+    _ABOUT = "Weight of each term of the reward, minus their weighted sum; 0 switches a term off.\n\nArgs:\n"
     RewardWeights = configuration(
         type(
             "RewardWeights",
             (),
             {
-                "__doc__": "Weight of each term of the reward, minus their weighted sum; 0 switches a term off."
-                f"\n\nArgs:\n{_ABOUT}\n",
+                "__doc__": _ABOUT + "".join(f"    {one.name}: {one.about}\n" for one in DECLARED),
                 "__module__": __name__,
-                "__annotations__": {one.name: NonNegative for one in DECLARED},
+                "__annotations__": dict.fromkeys(TERMS, NonNegative),
                 **{one.name: one.weight for one in DECLARED},
             },
         )

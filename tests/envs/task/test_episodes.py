@@ -15,9 +15,8 @@ from motion_cueing.envs.task import (
     EpisodeOptions,
     RandomizationOptions,
 )
-from motion_cueing.envs.task.draws import key_of, uniform, words
 from motion_cueing.envs.task.drives import library_of
-from motion_cueing.envs.task.kernels.observation import draw, pose_scale, start_poses
+from motion_cueing.envs.task.episode import draw, key_of, pose_scale, start_poses, uniform, words
 
 from .tasks import drive
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +12,8 @@ import pytest
 from motion_cueing.baselines.washout import ClassicalWashout
 from motion_cueing.envs.simulator.kernels.observation import ROWS, SLICES
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomizationOptions
-from motion_cueing.envs.task.observation import (
-    BASE,
-    COMMAND,
-    DIFFERENCE,
-    MACHINE,
-    PERCEIVED,
-    TRAVEL_USED,
-    TRUE_MOTION,
-    last_action_row,
-    memory_row,
-    preview_row,
-)
+from motion_cueing.envs.task.kernels import observation as layout_page
+from motion_cueing.envs.task.observation import observation_table
 
 from .tasks import drive
 
@@ -250,32 +242,79 @@ def test_noise_differs_from_step_to_step_and_from_episode_to_episode():
     assert len({part.tobytes() for part in seen}) == 3
 
 
-def documented_rows() -> list[tuple[str, ...]]:
-    """Name, entries, unit, scale and bound of every row of the page's tables."""
-    page = (Path(__file__).parents[3] / "docs" / "environment.md").read_text(encoding="utf-8")
-    lines = [line.split("|") for line in page.splitlines() if line.startswith("| `")]
-    return [tuple(cell.strip().strip("`") for cell in line[1:6]) for line in lines if len(line) == 8]
+def rows_of(text: str) -> list[list[str]]:
+    """Name, entries, unit, scale and bound of every row of tables in Markdown."""
+    lines = [line.split("|") for line in text.splitlines() if line.startswith("| `")]
+    return [[cell.strip().strip("`") for cell in line[1:6]] for line in lines if len(line) == 8]
 
 
 def test_page_tells_every_row_as_it_is():
-    rows = [
-        *ROWS,
-        *DIFFERENCE,
-        last_action_row(9),
-        COMMAND,
-        BASE,
-        preview_row(1),
-        memory_row(1),
-        *PERCEIVED,
-        *TRUE_MOTION,
-        *MACHINE,
-        TRAVEL_USED,
-    ]
-    expected = []
-    for r in rows:
-        size = "6 each" if r.name in ("preview", "memory") else str(r.size)
-        expected.append((r.name, size, r.unit, f"{r.scale:g}", f"{r.bound:g}"))
-    assert documented_rows() == expected
+    page = (Path(__file__).parents[3] / "docs" / "environment.md").read_text(encoding="utf-8")
+    assert rows_of(page) == rows_of(observation_table())
+
+
+EVERYTHING = {"preview": 2, "memory": (1.0,), "perceived": True, "true_motion": True, "machine": True}
+
+
+@pytest.mark.parametrize("mode", ["acceleration", "jerk", "residual"])
+def test_every_entry_is_written(mode):
+    base = ClassicalWashout() if mode == "residual" else None
+    env = DrivingSimulator(drives=[drive()], observation=EVERYTHING, action={"mode": mode}, base=base)
+    env.reset(seed=0)
+    env.batch.arrays.observation.view[...] = np.nan
+    env.batch.arrays.fixed.view[...] = np.nan
+    observation, *_ = env.step(np.zeros(9))
+    assert np.isfinite(observation).all()
+
+
+ANOTHER_ROW = """
+import importlib.util, sys
+
+PAGE = "motion_cueing.envs.task.kernels.observation"
+
+
+class Changed:
+    def find_spec(self, name, path=None, target=None):
+        return importlib.util.spec_from_file_location(name, sys.argv[1]) if name == PAGE else None
+
+
+sys.meta_path.insert(0, Changed())
+import numpy as np
+from motion_cueing.envs.task import DrivingSimulator
+from motion_cueing.envs.task.kernels import observation as layout_page
+from motion_cueing.envs.task.observation import observation_table
+
+env = DrivingSimulator(episode={"library": 1, "drive_duration": 2.0})
+plain, _ = env.reset(seed=0)
+for _ in range(5):
+    observation, *_ = env.step(np.full(9, 0.1))
+where = env.batch.layout.slices
+state = env.batch.simulator.state[0]
+np.testing.assert_allclose(2.0 * observation[where["height"]], state["motion"]["displacement"][2:], rtol=1e-6)
+np.testing.assert_allclose(observation[where["last_action"]], 0.1, rtol=1e-6)
+error = state["reference_cue"]["rate"] - state["simulator_cue"]["rate"]
+np.testing.assert_allclose(observation[where["rate_error"]], error, rtol=1e-5, atol=1e-7)
+assert list(where).index("height") == list(where).index("rate_error") - 1
+assert "| `height` | 1 | m | 2 | 10 | how deep the cab hangs |" in observation_table()
+"""
+
+
+def test_another_row_takes_one_page(tmp_path):
+    """A row between others: declared and written on one page, and every other row stays right."""
+    page = Path(layout_page.__file__).read_text(encoding="utf-8")
+    declared, written = '        Row("rate_error"', "    if f.command >= 0:"
+    assert page.count(declared) == page.count(written) == 1
+    page = page.replace(
+        declared, '        Row("height", 1, 2.0, "m", "how deep the cab hangs"),\n' + declared
+    ).replace(
+        written,
+        '    put_entry(out, i, f.height, s.motion.displacement[2] / wp.static(UNIT["height"]), bounds)\n'
+        + written,
+    )
+    (tmp_path / "observation.py").write_text(page, encoding="utf-8")
+    command = [sys.executable, "-c", ANOTHER_ROW, str(tmp_path / "observation.py")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_entries_beyond_their_bound_are_clipped():

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions, RewardOptions, RewardWeights
-from motion_cueing.envs.task.kernels.reward import TERMS
+from motion_cueing.envs.task.kernels import reward as reward_page
+from motion_cueing.envs.task.reward import DECLARED, TERMS
 from motion_cueing.evaluation import signals
 from motion_cueing.evaluation.metrics import Criteria
 
@@ -98,3 +102,55 @@ def test_an_end_of_travel_terminates_only_where_asked(asked):
 
 def test_terms_have_weights_of_the_same_names():
     assert list(TERMS) == list(RewardWeights.__dataclass_fields__)
+
+
+def test_page_tells_every_weight_as_it_is():
+    page = (Path(__file__).parents[3] / "docs" / "environment.md").read_text(encoding="utf-8")
+    lines = [[cell.strip() for cell in line.split(" | ")] for line in page.splitlines()]
+    found = {line[0].strip("|` "): line[-1].strip("| ") for line in lines if line[0].strip("|` ") in TERMS}
+    assert found == {one.name: f"{one.weight:g}" for one in DECLARED}
+
+
+ANOTHER_TERM = """
+import importlib.util, sys
+
+PAGE = "motion_cueing.envs.task.kernels.reward"
+
+
+class Changed:
+    def find_spec(self, name, path=None, target=None):
+        return importlib.util.spec_from_file_location(name, sys.argv[1]) if name == PAGE else None
+
+
+sys.meta_path.insert(0, Changed())
+import numpy as np
+from motion_cueing.envs.task import DrivingSimulator, RewardWeights
+from motion_cueing.envs.task.reward import TERMS, reward_table
+
+assert TERMS[4:6] == ("height", "stroke")
+assert "| `height` | 3 | Depth of the cab, m. |" in reward_table()
+env = DrivingSimulator(episode={"library": 1, "drive_duration": 30.0, "terminate_on_failure": True})
+env.reset(seed=0)
+action, terminated = np.array([1.0, 0, 0, 0, 0.05, 0, 0, 0, 0]), False
+while not terminated:
+    _, reward, terminated, truncated, info = env.step(action)
+    assert not truncated
+    assert info["height"] == abs(env.batch.simulator.state[0]["motion"]["displacement"][2])
+    weights = RewardWeights()
+    assert np.isclose(reward, -sum(getattr(weights, name) * info[name] for name in TERMS))
+assert info["failure"] == 1.0 and reward < -100.0 and info["stroke"] > 0.5
+"""
+
+
+def test_another_term_takes_one_function_and_moves_no_weight(tmp_path):
+    page = Path(reward_page.__file__).read_text(encoding="utf-8")
+    before = "@term(weight=0.1)\n@wp.func\ndef stroke("
+    assert page.count(before) == 1
+    added = (
+        "@term(weight=3.0)\n@wp.func\ndef height(r: RewardScale, m: Machine, s: State) -> real:\n"
+        '    """Depth of the cab, m."""\n    return wp.abs(s.motion.displacement[2])\n\n\n'
+    )
+    (tmp_path / "reward.py").write_text(page.replace(before, added + before), encoding="utf-8")
+    command = [sys.executable, "-c", ANOTHER_TERM, str(tmp_path / "reward.py")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
