@@ -1,8 +1,7 @@
 """The motion base: carriage, hexapod, turntable, their limits and kinematics."""
 
 from .kinematics import legs_of_pose, pose_of_legs
-from .machines import Cab, Carriage, Hexapod, Platform, Turntable
-from .parameters import actuator_limits
+from .machines import Cab, Carriage, Hexapod, Platform, Turntable, actuator_limits
 from .presets import ablation_names, ablations, get_platform, load_platform, platform_names
 
 __all__ = [

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import GeometryError, UnknownNameError
 from ..settings import Vector3, load
+from .kinematics import check_geometry
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
-from .parameters import check_geometry
 
 
 def _without_turntable(platform: Platform) -> Platform | None:

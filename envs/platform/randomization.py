@@ -10,8 +10,8 @@ from pydantic import Field
 
 from ..errors import ConfigurationError
 from ..settings import Positive, Vector2, Vector3, configuration
+from .kinematics import check_geometry
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
-from .parameters import check_geometry
 
 Range = tuple[Positive, Positive]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]

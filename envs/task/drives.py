@@ -14,8 +14,7 @@ from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..maneuvers import drive_seeds, get_maneuver, get_recording, recording_names
 from ..maneuvers.maneuver import LARGEST_OFFSET
-from ..platform.kernels.step import ActuatorDynamics
-from ..platform.machines import Platform
+from ..platform.machines import ActuatorDynamics, Platform
 from ..platform.presets import get_platform
 from ..platform.randomization import random_platform
 from .options import EpisodeOptions, RandomizationOptions, TaskOptions

@@ -12,8 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..platform.machines import Platform
-from ..platform.parameters import UNLIMITED
+from ..platform.machines import UNLIMITED, Platform
 from .options import EpisodeOptions, RandomizationOptions
 
 Floats = NDArray[np.float64]

@@ -13,16 +13,14 @@ of travel is met with a bump. Solving the condition of the next state for v' giv
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Final
 
-import numpy as np
 import warp as wp
-from numpy.typing import NDArray
-from pydantic import Field
-from scipy.linalg import expm
 
 from ...arrays import mat65, real, vec2, vec3, vec6, vec9
-from ...settings import NonNegative, Positive, configuration
+from ..kinematics import NEARLY_SINGULAR
+from ..machines import ACTUATORS as ACTUATORS
+from ..machines import AXES as AXES
 from .geometry import (
     NEWTON_TOLERANCE,
     HexapodGeometry,
@@ -102,12 +100,6 @@ LEGS = slice(2, 8)
 TURNTABLE = 8
 """Order of the nine actuators: carriage x and y, legs 1 to 6, turntable."""
 
-ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "leg_5", "leg_6", "turntable")
-"""Names of the nine actuators."""
-
-AXES = ("carriage_x", "carriage_y", "surge", "sway", "heave", "roll", "pitch", "yaw", "turntable")
-"""Names of the nine degrees of freedom an action commands, in its order."""
-
 END_OF_TRAVEL: Final = 0x111111111
 """Bits of a step's limits that say an end of travel, one for each actuator."""
 
@@ -170,36 +162,6 @@ class Step:
 # for that input the lag is discretized exactly.
 
 
-@configuration
-class ActuatorDynamics:
-    """Second-order lag and dead time of one subsystem.
-
-    Args:
-        natural_frequency: omega, rad/s; None for no lag (unity).
-        damping: zeta, at least 1 so that no limit is overshot.
-        dead_time: Pure delay, s; rounded to whole time steps.
-    """
-
-    natural_frequency: Positive | None = None
-    damping: Annotated[float, Field(ge=1.0)] = 1.0
-    dead_time: NonNegative = 0.0
-
-
-def lag_transition(dynamics: ActuatorDynamics, dt: float) -> NDArray[np.float64]:
-    """(2, 5) matrix from [y, ydot, u, udot, uddot] to [y, ydot] one step later, u being the set-point.
-
-    Zero where there is no lag; such a subsystem is not filtered.
-    """
-    omega = dynamics.natural_frequency
-    if omega is None:
-        return np.zeros((2, 5))
-    system = np.zeros((5, 5))
-    system[0, 1] = 1.0
-    system[1, :3] = [-(omega**2), -2.0 * dynamics.damping * omega, omega**2]
-    system[2, 3] = system[3, 4] = 1.0
-    return np.asarray(expm(system * dt)[:2])
-
-
 @wp.func
 def subsystem(actuator: int) -> int:
     """0 carriage, 1 hexapod, 2 turntable."""
@@ -236,9 +198,6 @@ def lag(
 
 # Singular poses, in which the legs do not hold the platform: it is kept from coming to rest near one.
 
-
-NEARLY_SINGULAR = wp.constant(real(0.15))
-"""Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
 
 FAR_FROM_SINGULAR = wp.constant(real(0.75))
 """Clearance from which braking is taken not to lead to a singular pose."""
@@ -285,7 +244,7 @@ def keeps_clear(
     now = determinant(jacobian) / m.neutral_determinant
     if now >= FAR_FROM_SINGULAR:
         return True
-    least = wp.min(NEARLY_SINGULAR, clearance(m, start.displacement, start.beta))
+    least = wp.min(real(wp.static(NEARLY_SINGULAR)), clearance(m, start.displacement, start.beta))
     if now < least:
         return False
     halfway = extensions

@@ -13,8 +13,8 @@ from pydantic import Field
 from ...arrays import real, vec2, vec3, vec9
 from ...errors import UnknownNameError
 from ...platform.kernels.step import AXES, Motion
+from ...platform.kinematics import neutral_jacobian
 from ...platform.machines import Platform
-from ...platform.parameters import neutral_jacobian
 from ...settings import Positive, configuration
 
 Floats = NDArray[np.float64]

@@ -22,8 +22,8 @@ from scipy.signal import lfilter
 from ...arrays import real, vec2, vec3, vec9
 from ...cues import GRAVITY, CueTrace
 from ...platform.kernels.step import Machine, Motion
+from ...platform.kinematics import axis_reach
 from ...platform.machines import Platform, Turntable
-from ...platform.parameters import axis_reach
 from ...settings import Positive, configuration, renamed
 from ...simulator.kernels.observation import (
     FIRST,

@@ -19,7 +19,7 @@ from pydantic import Field
 from ...arrays import real, vec3
 from ...cues import GRAVITY
 from ...platform.kernels.step import END_OF_TRAVEL, SINGULAR, Machine
-from ...platform.parameters import UNLIMITED
+from ...platform.machines import UNLIMITED
 from ...settings import NonNegative, Positive, Vector3, configuration
 from ...simulator.kernels.step import CueCost, State, Zone, zone
 from ...simulator.kernels.step import cue_error as cue_cost

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from motion_cueing.envs.platform import legs_of_pose
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
-from motion_cueing.envs.platform.kernels.step import lag_transition
+from motion_cueing.envs.platform.parameters import lag_transition
 
 from ...reference.actuators import lag
 from ...reference.comparison import bits

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import Platform
-from motion_cueing.envs.platform.kinematics import legs_of_pose, pose_of_legs
-from motion_cueing.envs.platform.parameters import axis_reach, machine_parameters
+from motion_cueing.envs.platform.kinematics import axis_reach, legs_of_pose, pose_of_legs
+from motion_cueing.envs.platform.parameters import machine_parameters
 from motion_cueing.envs.platform.randomization import PlatformRanges, random_platform, resized
 
 from .platforms_under_test import DT, PRESETS

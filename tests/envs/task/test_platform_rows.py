@@ -7,7 +7,7 @@ import pytest
 
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
-from motion_cueing.envs.platform.parameters import axis_reach
+from motion_cueing.envs.platform.kinematics import axis_reach
 from motion_cueing.envs.platform.randomization import PlatformRanges
 from motion_cueing.envs.task import (
     DrivingSimulator,
