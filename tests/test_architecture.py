@@ -10,7 +10,7 @@ import pytest
 
 from .repository import PACKAGES, ROOT, package_files
 
-BASICS = {"envs.errors", "envs.settings", "envs.storage", "envs.arrays", "envs.cues"}
+BASICS = {"envs.errors", "envs.settings", "envs.storage", "envs.arrays", "envs.cues", "envs.registry"}
 """Modules every room may use."""
 
 ALLOWED = {

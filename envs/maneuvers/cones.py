@@ -232,7 +232,6 @@ class DoubleLaneChange(ConeManeuver):
     """
 
     name: ClassVar[str] = "double-lane-change"
-    summary: ClassVar[str] = "severe double lane change at 80 km/h (ISO 3888-1)"
 
     offset: Positive = 3.5
 
@@ -260,7 +259,6 @@ class ObstacleAvoidance(ConeManeuver):
     """
 
     name: ClassVar[str] = "obstacle-avoidance"
-    summary: ClassVar[str] = "obstacle avoidance at 45 km/h (ISO 3888-2)"
 
     speed: Positive = 45.0 * KMH
     margin: Positive = 0.1
@@ -289,7 +287,6 @@ class Slalom(ConeManeuver):
     """
 
     name: ClassVar[str] = "slalom"
-    summary: ClassVar[str] = "slalom round cones 18 m apart at 50 km/h"
 
     speed: Positive = 50.0 * KMH
     margin: Positive = 0.2

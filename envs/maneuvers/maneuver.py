@@ -36,8 +36,6 @@ class Maneuver(ABC):
 
     name: ClassVar[str]
     """What it is called on the command line."""
-    summary: ClassVar[str]
-    """One line for lists and reports."""
 
     settle: Positive = 2.0
     calm: Positive = 3.0

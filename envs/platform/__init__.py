@@ -2,7 +2,15 @@
 
 from .kinematics import legs_of_pose, pose_of_legs
 from .machines import Cab, Carriage, Hexapod, Platform, Turntable, actuator_limits
-from .presets import ablation_names, ablations, get_platform, load_platform, platform_names
+from .presets import (
+    ablation_names,
+    ablations,
+    describe_platform,
+    get_platform,
+    load_platform,
+    platform_names,
+    register,
+)
 
 __all__ = [
     "Cab",
@@ -13,9 +21,11 @@ __all__ = [
     "ablation_names",
     "ablations",
     "actuator_limits",
+    "describe_platform",
     "get_platform",
     "legs_of_pose",
     "load_platform",
     "platform_names",
     "pose_of_legs",
+    "register",
 ]

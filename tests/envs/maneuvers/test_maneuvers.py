@@ -8,7 +8,7 @@ import pytest
 from motion_cueing.envs.car import car_names, get_car
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
-from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
+from motion_cueing.envs.maneuvers import describe_maneuver, get_maneuver, maneuver_names
 from motion_cueing.envs.maneuvers.cones import (
     DoubleLaneChange,
     Gate,
@@ -226,7 +226,7 @@ def test_parameters_go_through_yaml_and_refuse_nonsense(name, tmp_path):
         from_dict(type(maneuver), {"settle": -1.0})
     with pytest.raises(ConfigurationError, match="unknown field"):
         from_dict(type(maneuver), {"velocity": 1.0})
-    assert type(maneuver).summary
+    assert describe_maneuver(name)
     assert type(maneuver).__doc__
 
 
