@@ -17,6 +17,10 @@ class ConfigurationError(MotionCueingError, ValueError):
     """A field of a configuration is unknown, missing, of the wrong type or out of range."""
 
 
+class UnknownArgumentError(ConfigurationError, TypeError):
+    """A keyword that an environment does not know; a TypeError for libraries that try keywords out."""
+
+
 class GeometryError(ConfigurationError):
     """A hexapod that cannot close, or whose neutral pose is singular."""
 

@@ -179,20 +179,10 @@ class Car:
         front = self.rear_axle / tires.front_cornering_stiffness
         return self.mass / self.wheelbase * (front - self.front_axle / tires.rear_cornering_stiffness)
 
-    @property
-    def roll_gradient(self) -> float:
-        """Steady roll angle per lateral acceleration, rad per m/s^2 (negative: the body leans outwards)."""
-        body = self.suspension
-        return -body.sprung_mass * body.arm / (body.roll_stiffness - body.sprung_mass * GRAVITY * body.arm)
-
     def steering_wheel_for(self, speed: float, lateral_acceleration: float) -> float:
         """Steering-wheel angle of a steady turn in the linear range, rad: i (L / R + K a_y)."""
         road_wheel = self.wheelbase / speed**2 + self.understeer_gradient
         return self.steering.ratio * road_wheel * lateral_acceleration
-
-    def yaw_rate_gain(self, speed: float) -> float:
-        """Steady yaw rate per steering-wheel angle in the linear range, 1/s: v / (i (L + K v^2))."""
-        return speed / (self.steering.ratio * (self.wheelbase + self.understeer_gradient * speed**2))
 
 
 # The cars of the package, by name.

@@ -78,8 +78,8 @@ class RandomizationOptions:
         friction: Range of a factor on the tires' friction, drawn for each drive of the library.
         natural_frequency: Range of the actuators' lag, rad/s; None leaves the platform's own.
         dead_time: Range of the actuators' dead time, s; None leaves the platform's own.
-        build: How the machines themselves differ; None leaves the platform as it is.
-        machines: Machines to draw from, if build, lag or dead time are drawn.
+        platform: How the platforms themselves differ; None leaves the given one as it is.
+        platforms: Platforms to draw from, if they, their lag or their dead time are drawn.
         actuator_gain: Largest relative error of the acceleration of each axis.
         sensor_gain: Largest relative error of the cab's accelerometers and gyroscopes.
         force_noise: Standard deviation of the noise of the cab's accelerometers, m/s^2.
@@ -89,8 +89,8 @@ class RandomizationOptions:
     friction: tuple[Positive, Positive] = (1.0, 1.0)
     natural_frequency: tuple[Positive, Positive] | None = None
     dead_time: tuple[NonNegative, NonNegative] | None = None
-    build: PlatformRanges | None = None
-    machines: PositiveCount = 16
+    platform: Annotated[PlatformRanges | None, renamed("platform", "build")] = None
+    platforms: Annotated[PositiveCount, renamed("platforms", "machines")] = 16
     actuator_gain: Share = 0.0
     sensor_gain: Share = 0.0
     force_noise: NonNegative = 0.0

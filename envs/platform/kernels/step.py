@@ -147,10 +147,9 @@ class SetPoint:
 
 @wp.struct
 class Step:
-    """One step of the machine: where it came to, how it accelerated, what held it back."""
+    """One step of the machine: where it came to, and what held it back."""
 
     motion: Motion
-    acceleration: vec9  # mean over the step, in the order of AXES
     limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
 
 

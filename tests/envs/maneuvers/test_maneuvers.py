@@ -21,6 +21,8 @@ from motion_cueing.envs.maneuvers.maneuver import DEGREE, KMH, LARGEST_OFFSET, M
 from motion_cueing.envs.maneuvers.standard import SineWithDwell, SteadyTurn
 from motion_cueing.envs.settings import from_dict, load, save
 
+from ..car.gains import roll_gradient
+
 REST = np.array([0.0, 0.0, -GRAVITY])
 PAPER = ["steady-turn", "braking", "lane-change"]
 
@@ -130,7 +132,7 @@ def test_steady_turn_of_the_paper(drives):
     side = trace.specific_force[:, 1] / GRAVITY
     assert side.max() == pytest.approx(0.25, abs=0.01)
     centripetal = (60 * KMH) ** 2 / 150 / GRAVITY
-    roll = -get_car("sedan").roll_gradient * GRAVITY * centripetal
+    roll = -roll_gradient(get_car("sedan")) * GRAVITY * centripetal
     assert side[-1] == pytest.approx(centripetal * np.cos(roll) + np.sin(roll), abs=2e-3)
     assert trace.angular_velocity[-1, 2] / DEGREE == pytest.approx(6.37, abs=0.02)
     assert trace.duration > 25.0

@@ -3,18 +3,88 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
 
 from motion_cueing.envs import CueTrace
-from motion_cueing.envs.errors import ActionError
+from motion_cueing.envs.arrays import FLOAT, real, vec9
 from motion_cueing.envs.platform import Platform, get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
-from motion_cueing.envs.simulator.kernels.gradient import Unroll
+from motion_cueing.envs.platform.kernels.step import SetPoint
+from motion_cueing.envs.simulator.kernels.gradient import add_cue_error, step_with_adjoint
+from motion_cueing.envs.simulator.kernels.step import CueCost, State, zone
 from motion_cueing.envs.simulator.simulator import Simulator
 
 STEPS, BATCH = 200, 2
+
+
+class Unroll:
+    """A simulator's drive over a number of steps, differentiable in its actions.
+
+    The drive begins at the state the simulator has when :meth:`gradient` is called, and leaves it there.
+
+    Args:
+        simulator: The batch; its actuator set-point history is taken along.
+        steps: Length of the unrolled drive.
+        cost: What is averaged over the steps, for each environment.
+    """
+
+    def __init__(self, simulator: Simulator, steps: int, cost: CueCost | None = None) -> None:
+        self.simulator, self.steps, self._zone = simulator, steps, zone(cost or CueCost())
+        n, device = simulator.n, simulator.device
+        keep: dict[str, Any] = {"device": device, "requires_grad": True}
+        self.states = [wp.zeros(n, dtype=State, **keep) for _ in range(steps + 1)]
+        shape = simulator.delay_array.shape
+        self.delays = [wp.zeros(shape, dtype=SetPoint, **keep) for _ in range(steps + 1)]
+        self.actions = [wp.zeros(n, dtype=vec9, **keep) for _ in range(steps)]
+        self.costs = wp.zeros(n, dtype=real, **keep)
+
+    def value(self, actions: ArrayLike) -> NDArray[np.float64]:
+        """(n,) mean cost over the steps with ``actions`` (steps, n, 9)."""
+        self._load(actions)
+        self._run()
+        return np.array(self.costs.numpy(), dtype=np.float64)
+
+    def gradient(self, actions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) mean costs, and their gradient (steps, n, 9) with respect to ``actions`` (steps, n, 9)."""
+        self._load(actions)
+        with wp.Tape() as tape:
+            self._run()
+        one = wp.full(self.simulator.n, 1.0, dtype=real, device=self.simulator.device)
+        tape.backward(grads={self.costs: one})
+        gradient = np.stack([action.grad.numpy() for action in self.actions])
+        tape.zero()
+        return np.array(self.costs.numpy(), dtype=np.float64), np.asarray(gradient, dtype=np.float64)
+
+    def _load(self, actions: ArrayLike) -> None:
+        for array, value in zip(self.actions, np.asarray(actions, dtype=FLOAT), strict=True):
+            array.assign(value)
+        wp.copy(self.states[0], self.simulator.state_array)
+        wp.copy(self.delays[0], self.simulator.delay_array)
+        self.costs.zero_()
+
+    def _run(self) -> None:
+        simulator = self.simulator
+        constants = simulator.constants
+        for k in range(self.steps):
+            wp.launch(
+                step_with_adjoint,
+                simulator.n,
+                inputs=[*constants, self.states[k], self.delays[k], self.actions[k]],
+                outputs=[self.states[k + 1], self.delays[k + 1]],
+                device=simulator.device,
+            )
+            wp.launch(
+                add_cue_error,
+                simulator.n,
+                inputs=[self._zone, self.states[k + 1], real(1.0 / self.steps)],
+                outputs=[self.costs],
+                device=simulator.device,
+            )
 
 
 def drive() -> CueTrace:
@@ -83,11 +153,3 @@ def test_the_cost_is_that_of_the_simulator():
         dw = state["simulator_cue"]["rate"] - state["reference_cue"]["rate"]
         total += (df**2).sum(axis=1) / 0.6**2 + (dw**2).sum(axis=1) / np.radians(3.0) ** 2
     np.testing.assert_allclose(total / STEPS, expected, rtol=1e-12)
-
-
-def test_bad_actions_are_refused():
-    unrolled = unroll(get_platform("paper"))
-    with pytest.raises(ActionError, match="shape"):
-        unrolled.value(np.zeros((3, 9)))
-    with pytest.raises(ActionError, match="finite"):
-        unrolled.value(np.full((STEPS, BATCH, 9), np.nan))

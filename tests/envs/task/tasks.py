@@ -47,13 +47,13 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     },
     "actuators": {
         "randomization": RandomizationOptions(
-            natural_frequency=(20.0, 60.0), dead_time=(0.0, 0.05), machines=3
+            natural_frequency=(20.0, 60.0), dead_time=(0.0, 0.05), platforms=3
         )
     },
     "builds": {
         "observation": ObservationOptions(machine=True),
         "randomization": RandomizationOptions(
-            build=PlatformRanges(travel=(0.5, 1.0), size=(0.4, 1.0), without_carriage=0.5), machines=3
+            platform=PlatformRanges(travel=(0.5, 1.0), size=(0.4, 1.0), without_carriage=0.5), platforms=3
         ),
     },
     "sensors": {

@@ -123,7 +123,7 @@ def test_drives_and_machines_are_drawn_evenly():
     env = DrivingSimulatorVector(
         600,
         drives=[drive(str(k), samples=3) for k in range(3)],
-        randomization=RandomizationOptions(natural_frequency=(10.0, 50.0), machines=2),
+        randomization=RandomizationOptions(natural_frequency=(10.0, 50.0), platforms=2),
     )
     env.reset(seed=0)
     # Six sigma of a binomial count.
@@ -132,7 +132,7 @@ def test_drives_and_machines_are_drawn_evenly():
 
 
 def test_machines_have_drawn_lags_and_dead_times_within_their_ranges():
-    ranges = RandomizationOptions(natural_frequency=(20.0, 40.0), dead_time=(0.01, 0.05), machines=5)
+    ranges = RandomizationOptions(natural_frequency=(20.0, 40.0), dead_time=(0.01, 0.05), platforms=5)
     platforms = DrivingSimulator(drives=[drive()], randomization=ranges).batch.simulator.platforms
     frequencies = [p.hexapod.dynamics.natural_frequency for p in platforms]
     delays = [p.carriage.dynamics.dead_time for p in platforms]

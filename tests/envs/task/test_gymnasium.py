@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import importlib.metadata
 import pickle
 import subprocess
 import sys
@@ -113,6 +115,72 @@ def test_pickled_environment_is_the_same():
     copy = pickle.loads(pickle.dumps(env))
     assert copy.task == env.task
     assert np.array_equal(copy.reset(seed=4)[0], env.reset(seed=4)[0])
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize(
+    ("name", "steps"), [("stack", 0), ("residual", 30), ("gains", 30), ("actuators", 90)]
+)
+def test_a_copy_in_mid_episode_goes_on_with_the_same_bits(name, steps, copied):
+    env = DrivingSimulator(**options(name))
+    env.action_space.seed(2)
+    env.reset(seed=4)
+    for _ in range(steps):
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        if terminated or truncated:
+            env.reset()
+    other = copied(env)
+    for _ in range(60):
+        action = env.action_space.sample()
+        seen, expected = other.step(action), env.step(action)
+        assert np.array_equal(seen[0], expected[0])
+        assert seen[1:] == expected[1:]
+        if expected[2] or expected[3]:
+            assert np.array_equal(other.reset()[0], env.reset()[0])
+
+
+@pytest.mark.parametrize("kind", [DrivingSimulator, lambda **given: DrivingSimulatorVector(2, **given)])
+def test_a_state_can_be_gone_back_to(kind):
+    env, other = kind(episode=SHORT), kind(episode=SHORT)
+    env.reset(seed=1)
+    action = np.full(env.action_space.shape, 0.2, dtype=np.float32)
+    for _ in range(10):
+        env.step(action)
+    state = env.get_state()
+    first = [env.step(action)[0] for _ in range(60)]
+    other.set_state(state)
+    assert all(np.array_equal(other.step(action)[0], seen) for seen in first)
+    env.set_state(state)
+    assert all(np.array_equal(env.step(action)[0], seen) for seen in first)
+
+
+def test_an_unknown_option_of_reset_is_refused():
+    with pytest.raises(ConfigurationError, match=r"reset: unknown option 'foo'\. Known: drive\."):
+        DrivingSimulator(episode=SHORT).reset(options={"foo": 1})
+    with pytest.raises(ConfigurationError, match=r"reset: unknown option 'mask'\. Did you mean reset_mask"):
+        DrivingSimulatorVector(2, episode=SHORT).reset(options={"mask": 1})
+
+
+@pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])
+def test_an_unknown_argument_is_a_type_error_as_libraries_expect_that_try_some_out(make):
+    with pytest.raises(TypeError, match="got an unexpected keyword argument 'frameskip'"):
+        make(ID, frameskip=1)
+    with pytest.raises(ConfigurationError, match=r"argument 'rendermode'\. Did you mean render_mode"):
+        make(ID, rendermode="human")
+
+
+def test_a_batch_answers_for_each_of_its_environments():
+    envs = DrivingSimulatorVector(2, episode=SHORT)
+    assert envs.get_attr("task") == (envs.task, envs.task)
+    scale = DrivingSimulator(episode=SHORT).scale
+    assert [one.tolist() for one in envs.call("scale")] == [scale.tolist()] * 2
+    assert envs.call("action_of", scale)[1].tolist() == [1.0] * 9
+    with pytest.raises(ConfigurationError, match=r"use reset\(\) of the vector environment"):
+        envs.call("reset")
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert motion_cueing.envs.__version__ == importlib.metadata.version("motion-cueing-gym")
 
 
 def test_drive_can_be_chosen_by_index_and_by_name():

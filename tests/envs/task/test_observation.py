@@ -18,7 +18,7 @@ from motion_cueing.envs.task.observation import observation_table
 from .tasks import drive
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
-LAG = RandomizationOptions(natural_frequency=(15.0, 15.0), machines=1)
+LAG = RandomizationOptions(natural_frequency=(15.0, 15.0), platforms=1)
 
 
 def moved(steps: int = 50, **arguments) -> tuple[DrivingSimulator, np.ndarray]:

@@ -42,7 +42,7 @@ def task(mode: str = "acceleration", **given) -> TaskOptions:
             "action": {"mode": mode, "frame": "cab", "repeat": 2, "authority": 0.3},
             "reward": {"stroke_margin": 0.2, "weights": {"stroke": 1.0, "tilt_rate": 0.5}},
             "episode": {"duration": 2.0, "random_start": True, "platform_offset": 0.4},
-            "randomization": RandomizationOptions(build=BUILD, machines=4),
+            "randomization": RandomizationOptions(platform=BUILD, platforms=4),
         }
         | given
     )
@@ -190,8 +190,8 @@ def test_the_same_seed_draws_the_same_machines_and_another_others():
     assert first.simulator.platforms == again.simulator.platforms
     assert not set(first.simulator.platforms) & set(other.simulator.platforms)
     # What is drawn of the dynamics does not depend on the builds.
-    lag = {"natural_frequency": (20.0, 40.0), "machines": 4}
-    with_build = begun(task(randomization={"build": {"size": (0.5, 1.0)}, **lag}), [0])
+    lag = {"natural_frequency": (20.0, 40.0), "platforms": 4}
+    with_build = begun(task(randomization={"platform": {"size": (0.5, 1.0)}, **lag}), [0])
     without = begun(task(randomization=lag), [0])
     pairs = zip(with_build.simulator.platforms, without.simulator.platforms, strict=True)
     assert all(a.hexapod.dynamics == b.hexapod.dynamics for a, b in pairs)
@@ -199,7 +199,7 @@ def test_the_same_seed_draws_the_same_machines_and_another_others():
 
 @pytest.mark.parametrize("mode", ["acceleration", "jerk"])
 def test_gradients_through_two_machines_agree_with_finite_differences(mode):
-    batch = begun(task(mode, randomization=RandomizationOptions(build=BUILD, machines=2)), [0, 1, 3])
+    batch = begun(task(mode, randomization=RandomizationOptions(platform=BUILD, platforms=2)), [0, 1, 3])
     assert len(set(batch.simulator.platform_of.tolist())) == 2
     found = gradient_that_agrees(TaskUnroll(batch, 8), LinearPolicy(batch.layout.size))
     told = batch.layout.slices["hexapod_top_speed"]

@@ -307,7 +307,7 @@ class TestWindow:
 
 
 def test_each_environment_shows_its_own_machine():
-    builds = {"machines": 2, "build": {"size": (0.4, 1.0), "without_carriage": 0.5}}
+    builds = {"platforms": 2, "platform": {"size": (0.4, 1.0), "without_carriage": 0.5}}
     looks = {"render_mode": "rgb_array", "render_size": SIZE, "drives": [drive(samples=LENGTH)]}
     envs = DrivingSimulatorVector(4, randomization=builds, **looks)
     envs.reset(seed=0)
