@@ -1,4 +1,4 @@
-"""Errors a user can meet: each says which field is wrong and how to mend it."""
+"""Errors a user can meet: each says which field is wrong and what to do."""
 
 from __future__ import annotations
 

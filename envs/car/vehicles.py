@@ -1,4 +1,4 @@
-"""Cars as data: every number of the vehicle model, with unit and meaning."""
+"""Cars as data: every number of the vehicle model with unit and meaning, and the cars of the package."""
 
 from __future__ import annotations
 

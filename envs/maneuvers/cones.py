@@ -1,4 +1,8 @@
-"""Cones on a test track: where a car's body may be, the smoothest way through, and how near it came."""
+"""Maneuvers between cones: both severe lane changes of ISO 3888 and the slalom.
+
+The driver plans the smoothest way through the gates that the car's body fits through, and learns from a first
+drive how far the car came from it.
+"""
 
 from __future__ import annotations
 
@@ -149,7 +153,7 @@ def clearance(trace: CueTrace, car: Car, gates: Sequence[Gate]) -> float:
     return least
 
 
-# Maneuvers between cones: both severe lane changes of ISO 3888, and the slalom.
+# The maneuvers.
 
 
 TEST_DRIVER = Driver(preview_time=0.7)

@@ -1,4 +1,4 @@
-"""What every maneuver has: a name, parameters, a plan, and the drive that comes of it."""
+"""The maneuver: a name, parameters, a plan for a car, and the drive that results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The three maneuvers of the paper: entry into a steady turn, braking to a stop, a single lane change."""
+"""Standard maneuvers: the paper's three, open-loop steering tests, and everyday traffic."""
 
 from __future__ import annotations
 

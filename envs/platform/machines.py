@@ -1,4 +1,4 @@
-"""Machines as configurations: carriage, hexapod, turntable and cab, in SI units."""
+"""Configuration of a motion base: carriage, hexapod, turntable and cab, with limits and actuators, in SI."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a configured machine to the constants its kernels read."""
+"""Kernel parameters of a configured motion base."""
 
 from __future__ import annotations
 

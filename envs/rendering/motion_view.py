@@ -1,4 +1,4 @@
-"""Where a machine stands at a moment, and the points and frames of its parts."""
+"""Pose of a motion base at a moment, and the points and frames of its parts."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A base policy under the agent: it acts, and the agent corrects it or turns its knobs.
+"""The base policy under an agent: it acts, and the agent corrects it (residual) or sets its gains.
 
-Any policy that follows Stable-Baselines3's convention can be one; this package does not know which there are.
+Any policy that follows Stable-Baselines3's convention can be one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The recorded launches of a batch: each kernel with its arrays, once for each copy of the state."""
+"""A batch of environments without an interface, on which the single, the vector and other environments run.
+
+Each kernel is a recorded launch with its arrays, once for each copy of the simulator's state.
+"""
 
 from __future__ import annotations
 
@@ -157,9 +160,6 @@ class Launches:
     def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> None:
         n, device = self._simulator.n, self._simulator.device
         self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)
-
-
-# A batch of environments without an interface: what the single, the vector and other environments share.
 
 
 Mask = NDArray[np.bool_]

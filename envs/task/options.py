@@ -1,4 +1,4 @@
-"""Everything that can be chosen about the environment, as frozen dataclasses that load from YAML."""
+"""Options of the environment, as frozen dataclasses that load from YAML."""
 
 from __future__ import annotations
 

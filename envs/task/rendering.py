@@ -102,7 +102,7 @@ class Pictures:
 
 
 class _View:
-    """What is kept of an environment between frames: its cues, its last frame and the steps since."""
+    """An environment between frames: its cues, its last frame and the steps since."""
 
     def __init__(self, dt: float) -> None:
         self.cues = CueHistory("", _DRIVER, dt)

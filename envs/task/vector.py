@@ -88,8 +88,8 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        told = {"render_fps": frames_per_second(self.batch), "autoreset_mode": self.autoreset_mode}
-        self.metadata = self.metadata | told
+        own = {"render_fps": frames_per_second(self.batch), "autoreset_mode": self.autoreset_mode}
+        self.metadata = self.metadata | own
         self._pictures = pictures_of(self.batch, render_mode, render_size)
         self._copy = copy
         self._ended = np.zeros(num_envs, dtype=bool)

@@ -1,14 +1,25 @@
-"""Output limiting of one actuator, which brakes in time.
+"""The step of the motion base: nine accelerations in, the true motion out, all limits kept.
 
-An actuator moves with constant acceleration over a step. Its state (q, v) is safe at an upper end
+    command -> limited set-point -> dead time -> lag -> true motion
+
+**Set-point.** Each step begins where limiting left it, so a command never winds up. Carriage and turntable
+are limited axis by axis. A hexapod command is followed exactly where every leg may; else each leg goes as
+far towards it as its limits allow, and the platform goes where forward kinematics says.
+
+**Limits.** An actuator moves with constant acceleration over a step. Its state (q, v) is safe at an upper end
 q_max if it can stop before it with the acceleration limit A, in whole steps:
 
     v <= 0 and q <= q_max,   or   v^2 / (2 A) + A dt^2 / 8 <= q_max - q.
 
-The set is invariant: from every safe state a speed v' exists with |v' - v| <= A dt that leads to a
-safe state again, so position, speed and acceleration limits hold together and for ever, and no end
-of travel is met with a bump. Solving the condition of the next state for v' gives the bound of
-:func:`braking_speed`. Between the limits the actuator does exactly what it is told.
+The set is invariant: from every safe state a speed v' exists with |v' - v| <= A dt that leads to a safe
+state again. So position, speed and acceleration limits hold together and forever, and no end of travel is
+met with a bump. Solving the condition of the next state for v' gives the bound of :func:`braking_speed`.
+
+**Actuators.** A second-order lag and a dead time for each subsystem; none by default, as in the paper. The
+lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere negative:
+position, speed and acceleration of the machine are weighted means of those of the set-point, and keep every
+limit the set-point keeps. For a set-point of constant acceleration within a step the lag is discretized
+exactly.
 """
 
 from __future__ import annotations
@@ -92,7 +103,7 @@ def active_limit(
     return 4
 
 
-# What the kernels know of a machine (constant) and of its motion (changing).
+# A machine (constant) and its motion (changing).
 
 
 CARRIAGE = slice(0, 2)
@@ -153,12 +164,7 @@ class Step:
     limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
 
 
-# Actuator dynamics: a second-order lag and a dead time for each subsystem. None by default, as in the paper.
-#
-# The lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere
-# negative: position, speed and acceleration of the machine are weighted means of those of the set-point,
-# and keep every limit the set-point keeps. Within a step the set-point moves with constant acceleration;
-# for that input the lag is discretized exactly.
+# Lag and dead time.
 
 
 @wp.func
@@ -195,7 +201,7 @@ def lag(
     return vec2(position, rate)
 
 
-# Singular poses, in which the legs do not hold the platform: it is kept from coming to rest near one.
+# Singular poses: the platform does not come to rest near one, where its legs do not hold it.
 
 
 FAR_FROM_SINGULAR = wp.constant(real(0.75))
@@ -259,13 +265,7 @@ def keeps_clear(
     return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
 
 
-# One step of the machine: nine accelerations in, the true motion out.
-#
-#     command -> limited set-point -> dead time -> lag -> true motion
-#
-# The set-point starts each step where limiting left it, so a command never winds up. Carriage and
-# turntable are limited axis by axis. A hexapod command is followed exactly where every leg may; else each
-# leg goes as far towards it as its limits allow and the platform goes where forward kinematics says.
+# The step.
 
 
 @wp.struct

@@ -1,6 +1,6 @@
-"""Gradients of a cue cost through many steps, by Warp's tape.
+"""Adjoint of the simulator's step, for gradients of a cue cost through many steps by Warp's tape.
 
-The adjoint is compiled as a module of its own, when it is first asked for (about a minute, once a machine).
+It is compiled as a module of its own, when it is first used (about a minute, once a machine).
 """
 
 from __future__ import annotations

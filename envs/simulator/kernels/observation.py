@@ -1,7 +1,7 @@
-"""What a policy sees: one flat row an environment, in fixed physical scaling.
+"""The simulator's observation: one flat row an environment, in fixed physical scaling.
 
-Car cues now, cues felt, and the machine's state. The machine's rows are its set-points: what the limits act
-on and a controller steers; without actuator dynamics they are the true motion.
+Reference cues now, simulator cues, and the machine's state. The machine's rows are its set-points, on which
+the limits act and which a controller steers; without actuator dynamics they are the true motion.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
-"""The kernels of a batch: play a step, begin an episode, look. Everything is one launch, for all rows.
+"""The kernels of a batch: play a time step, look (observe), and forget the actions of an ended episode.
 
-action -> accelerations -> **machine, cues, perception** -> reward -> observation
+action -> accelerations -> **motion base, cues, perception** -> reward -> observation
+
+Each is one launch for all environments. The second pair has adjoints and works out of place; compiling it
+takes about a minute, once a machine.
 """
 
 from __future__ import annotations
@@ -199,8 +202,7 @@ def forget(a: Arrays) -> None:
     a.command[i] = Command()
 
 
-# The same with adjoints, out of place, one launch a time step. Compiling them takes about a minute, once a
-# machine.
+# With adjoints.
 
 
 @wp.kernel(enable_backward=True, module="unique")

@@ -57,7 +57,7 @@ class ObservationOptions:
         frame: Axes of the machine's rows: "machine", or "cab": turned with the cab's heading, so that what
             is ahead of the driver looks the same wherever the turntable stands.
         machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
-            A policy that is told this runs on any machine.
+            A policy that sees this runs on any machine.
         simulator_cue: Source of the rows of simulator cues. "machine": true motion, by its sensors. "model":
             those of the set-points, which a controller works out by itself. A policy that sees the second
             has no loop through the actuators, so their lag and dead time cannot make it swing.
@@ -271,7 +271,7 @@ def observation_table() -> str:
     return "\n".join(lines)
 
 
-# What a policy knows of the past: the car's cues through first-order low-passes.
+# Memory: the car's cues through first-order low-passes.
 
 
 def low_passed(drives: Sequence[CueTrace], time_constants: Sequence[float], dt: float) -> NDArray[np.float32]:
@@ -294,7 +294,7 @@ def _of_drive(drive: CueTrace, time_constants: Sequence[float], dt: float) -> ND
     return np.hstack(columns)
 
 
-# What a machine can do, as the numbers of an observation.
+# Abilities of a machine.
 
 
 _TURN: Final = 2.0 * np.pi

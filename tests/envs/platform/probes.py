@@ -79,6 +79,8 @@ def cab_kernel(
 
 @wp.struct
 class LegRows:
+    extensions: wp.array(dtype=vec6)
+    pose: wp.array(dtype=vec6)
     rates: wp.array(dtype=vec6)
     back: wp.array(dtype=vec6)
     u: wp.array(dtype=mat63)
@@ -96,6 +98,9 @@ def leg_kernel(
     beta = vec3(p[3], p[4], p[5])
     jacobian = hexapod.leg_jacobian(g, vec3(p[0], p[1], p[2]), beta)
     rates = hexapod.leg_rates(jacobian, vec3(d[0], d[1], d[2]), beta, vec3(d[3], d[4], d[5]))
+    extensions = hexapod.leg_extensions(g, vec3(p[0], p[1], p[2]), beta)
+    out.extensions[i] = extensions
+    out.pose[i] = hexapod.forward_kinematics(g, extensions, vec3(), vec3())
     out.rates[i] = rates
     out.back[i] = hexapod.platform_rates(jacobian, beta, rates)
     out.u[i] = jacobian.u

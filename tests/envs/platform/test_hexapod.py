@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from motion_cueing.envs.errors import DataError, GeometryError
 from motion_cueing.envs.platform import Platform, legs_of_pose, pose_of_legs
+from motion_cueing.envs.platform.kinematics import leg_motion, rotation, turning_axes
 
 from ...reference import MachineModel
 from ...reference import kinematics as plain
@@ -48,6 +49,24 @@ def test_lengths_are_distances_between_joints(platform):
 def test_forward_kinematics_undoes_inverse_kinematics(name, share):
     legs, pose = PRESETS[name].hexapod, within(PRESETS[name], np.array(share))
     np.testing.assert_allclose(pose_of_legs(legs, legs_of_pose(legs, pose)), pose, atol=1e-11)
+
+
+@every_preset
+def test_legs_in_motion_are_those_of_the_kernels(platform):
+    pose = poses(platform)
+    found, kernel = leg_motion(platform.hexapod, pose, DIRECTION), leg_rows(platform.hexapod, pose, DIRECTION)
+    np.testing.assert_allclose(found.extension, kernel["extensions"], atol=1e-14)
+    np.testing.assert_allclose(kernel["pose"], pose, atol=1e-11)
+    np.testing.assert_allclose(found.rate, kernel["rates"], atol=1e-13)
+    np.testing.assert_allclose(found.clearance, plain.clearance(MachineModel.of(platform), pose), rtol=1e-10)
+
+
+def test_rotations_are_scipys_and_turn_about_their_axes():
+    angles, rates, h = 0.5 * DIRECTION[:, :3], DIRECTION[:, 3:], 1e-6
+    np.testing.assert_allclose(rotation(angles), Rotation.from_euler("XYZ", angles).as_matrix(), atol=1e-14)
+    ahead, behind = (Rotation.from_euler("XYZ", angles + sign * h * rates) for sign in (1.0, -1.0))
+    omega = (ahead * behind.inv()).as_rotvec() / (2.0 * h)
+    np.testing.assert_allclose((turning_axes(angles) @ rates[..., None])[..., 0], omega, atol=1e-8)
 
 
 @every_preset
