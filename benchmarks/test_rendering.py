@@ -11,7 +11,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.rendering import FRAMES_PER_SECOND, Renderer
 from motion_cueing.envs.rendering.renderer import SIZE
 from motion_cueing.envs.simulator.simulator import TIME_STEP
-from tests.rendering.moments import moment, weaving
+from tests.envs.rendering.moments import moment, weaving
 
 from .test_step import describe
 

@@ -1,7 +1,7 @@
-"""The number types of every Warp kernel: one place that says single or double.
+"""Number types of the kernels, devices, and arrays that host and kernels share.
 
-Double is the default. ``MOTION_CUEING_PRECISION=single`` in the environment, set before
-the first import, selects single precision (useful on consumer GPUs).
+Kernels compute in double precision. ``MOTION_CUEING_PRECISION=single`` in the environment, set before the
+first import, selects single precision (useful on consumer GPUs).
 """
 
 from __future__ import annotations
@@ -53,8 +53,6 @@ mat33: Any = wp.types.matrix((3, 3), real)
 mat63: Any = wp.types.matrix((6, 3), real)
 mat65: Any = wp.types.matrix((6, 5), real)
 
-# Where arrays live and kernels run.
-
 
 def find_device(name: str) -> Any:
     """Warp's device of this name: "cpu", "cuda" or "cuda:0" and so on.
@@ -69,9 +67,6 @@ def find_device(name: str) -> Any:
         known = ", ".join(repr(device.alias) for device in wp.get_devices())
         why = "" if wp.is_cuda_available() else " (Warp finds no CUDA driver)"
         raise ConfigurationError(f"device is {name!r}; use one of {known}{why}") from None
-
-
-# Arrays that the host writes or reads and kernels work on.
 
 
 class Mirror:

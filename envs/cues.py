@@ -1,4 +1,4 @@
-"""The motion of a car as its driver should feel it: cue traces, and their CSV form."""
+"""Cue traces: the specific force and angular velocity of a car over time, and their CSV form."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class CueTrace:
         return float(self.time[-1] - self.time[0])
 
     def digest(self) -> str:
-        """SHA-256 of the motion, in hexadecimal: what is felt alike has the same, whatever it is called.
+        """SHA-256 of the motion, in hexadecimal: the same for the same motion, whatever the name.
 
         It covers the time step, specific force, angular velocity and angular acceleration, to the bit; not
         the name, the source or the channels.

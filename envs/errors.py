@@ -1,4 +1,4 @@
-"""Errors a user can meet: each says which field is wrong and how to mend it."""
+"""Errors a user can meet: each says which field is wrong and what to do."""
 
 from __future__ import annotations
 
@@ -15,6 +15,10 @@ class MotionCueingError(Exception):
 
 class ConfigurationError(MotionCueingError, ValueError):
     """A field of a configuration is unknown, missing, of the wrong type or out of range."""
+
+
+class UnknownArgumentError(ConfigurationError, TypeError):
+    """A keyword that an environment does not know; a TypeError for libraries that try keywords out."""
 
 
 class GeometryError(ConfigurationError):

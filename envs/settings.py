@@ -115,10 +115,10 @@ def _describe_one(item: dict[str, Any], cls: type[Any]) -> str:
     if item["type"] == "multiple_argument_values":
         return f"field {path!r} is given twice, by its place and by its name"
     message = str(item["msg"]).removeprefix("Value error, ")
-    told = f"field {path!r}: {message}" if path else message
+    text = f"field {path!r}: {message}" if path else message
     # The check of a whole configuration says itself what it found.
     whole = item["type"] == "value_error" and (not path or isinstance(item["input"], dict))
-    return told if whole else f"{told} (found {item['input']!r})"
+    return text if whole else f"{text} (found {item['input']!r})"
 
 
 def to_dict(config: Any) -> dict[str, Any]:

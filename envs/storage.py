@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Files: written whole or not at all, and places for them checked before the work."""
 
 from __future__ import annotations
 
@@ -49,9 +49,6 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a binary file in one piece."""
     with replacing(path, "wb") as file:
         file.write(data)
-
-
-# Where a command writes, checked before the work: a place that takes files, and nobody else's file.
 
 
 def check_folder(option: str, folder: Path) -> None:
@@ -108,8 +105,8 @@ def _check(option: str, target: Path, folder: Path) -> None:
     try:
         nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
         if not nearest.is_dir():
-            told = "" if nearest == target else f"{target}: "
-            raise DataError(f"{option} {told}{nearest} is a file; name a folder")
+            named = "" if nearest == target else f"{target}: "
+            raise DataError(f"{option} {named}{nearest} is a file; name a folder")
         probe(nearest)
     except OSError as error:
         reason = error.strerror or error

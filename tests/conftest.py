@@ -1,7 +1,13 @@
-"""Windows of the tests open on SDL's driver without a screen."""
+"""Windows open on SDL's driver without a screen, and no property test has a deadline."""
 
 from __future__ import annotations
 
 import os
 
+from hypothesis import settings
+
 os.environ["SDL_VIDEODRIVER"] = "dummy"
+
+# A test never times: on a busy machine Hypothesis' own 200 ms would fail one at random.
+settings.register_profile("motion-cueing")
+settings.load_profile("motion-cueing")

@@ -12,7 +12,7 @@ import yaml
 from motion_cueing.cli.main import COMMANDS, main
 from motion_cueing.evaluation.provenance import package_version
 
-from .car import synthetic_log
+from .envs.logs import synthetic_log
 from .repository import PACKAGES, ROOT
 from .train import agents
 

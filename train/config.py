@@ -181,15 +181,15 @@ class TrainingConfig:
 
 
 def validation_task(config: TrainingConfig) -> TaskOptions:
-    """The environment of the validation drives, on machines of their own where builds are drawn."""
-    given, build = config.validation, config.task.randomization.build
+    """The environment of the validation drives, on platforms of their own where these are drawn."""
+    given, ranges = config.validation, config.task.randomization.platform
     episode = EpisodeOptions(
         random=config.task.episode.random,
         library=given.drives,
         library_seed=given.seed,
         drive_duration=given.duration,
     )
-    machines = RandomizationOptions(build=build, machines=given.drives)
+    machines = RandomizationOptions(platform=ranges, platforms=given.drives)
     return replace(config.task, episode=episode, randomization=machines)
 
 

@@ -14,7 +14,8 @@ from scipy.linalg import block_diag, solve_discrete_lyapunov
 from ...envs.errors import ConfigurationError
 from ...envs.perception import VestibularModel
 from ...envs.perception.models import DiscreteFilter, discretize
-from ...envs.platform.kernels.step import LEGS, NEARLY_SINGULAR, TURNTABLE
+from ...envs.platform.kernels.step import LEGS, TURNTABLE
+from ...envs.platform.kinematics import NEARLY_SINGULAR
 from ...envs.settings import NonNegative, Positive, configuration
 from ...envs.simulator.simulator import N_AXES
 from ..symbolic import Expression, SymbolicMachine, cs, cues

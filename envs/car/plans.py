@@ -1,4 +1,4 @@
-"""Paths: the line on the road that the driver follows, with curvature and slope."""
+"""Plans of a drive: the path on the road with curvature and slope, and the speed over time."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def _integral(values: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(0.5 * STEP * (values[1:] + values[:-1]))))
 
 
-# Speed schedules: what the speed should be over time, from steps a person would name.
+# Speed schedules, made of steps a person would name: hold, change.
 
 
 DT: Final = 0.01

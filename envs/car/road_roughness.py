@@ -1,4 +1,4 @@
-"""Uneven roads: what two wheel tracks make of a car's cues, added to those of the smooth road.
+"""Road roughness: the cues that two rough wheel tracks add to those of the smooth road.
 
 Each track is Gaussian with the spectrum of ISO 8608, G(n) = G(n0) (n / n0)^-2 with n0 = 0.1 1/m. The body
 heaves, pitches and rolls on its springs by what is between the wheels; the motion is small, so that sums are
@@ -76,7 +76,7 @@ def _brownian(roughness: float, corner: float, points: int, rng: np.random.Gener
 
 @dataclass(frozen=True, eq=False)
 class Shaking:
-    """What an uneven road adds to a car's cues, (n, 3) each, as :class:`~..cues.CueTrace` has them."""
+    """The cues that a rough road adds, (n, 3) each, as :class:`~..cues.CueTrace` has them."""
 
     force: Floats
     rate: Floats

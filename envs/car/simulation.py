@@ -1,4 +1,4 @@
-"""From plans to cue traces: lays plans out for the kernel, launches it, names what comes back."""
+"""Simulation of plans: a batch of cars driven by the kernel, as cue traces."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
         One trace a plan, sampled at 100 Hz, at the origin of F_A, with the channels
         :data:`~.drive_kernel.COLUMNS`: accelerations are those of the point of the roll axis under the c.g.,
         in the road's frame; ``path_offset_m`` is the distance to the right of the path; throttle and brake
-        are shares. On an uneven road all three cues have what it adds to those of the smooth one.
+        are shares. On a rough road its shaking is added to all three cues.
 
     Raises:
         DataError: the car left the range of the model (a plan no car can follow).

@@ -1,14 +1,16 @@
-"""Cars as data: every number of the vehicle model, with unit and meaning."""
+"""Cars as data: every number of the vehicle model with unit and meaning, and the cars of the package."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
-from typing import Annotated, Final
+from dataclasses import replace as replaced
+from typing import Annotated, Any, Final
 
 from pydantic import Field
 
 from ..cues import GRAVITY
-from ..errors import look_up
+from ..registry import Registry
 from ..settings import NonNegative, Positive, Vector3, configuration
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -177,20 +179,10 @@ class Car:
         front = self.rear_axle / tires.front_cornering_stiffness
         return self.mass / self.wheelbase * (front - self.front_axle / tires.rear_cornering_stiffness)
 
-    @property
-    def roll_gradient(self) -> float:
-        """Steady roll angle per lateral acceleration, rad per m/s^2 (negative: the body leans outwards)."""
-        body = self.suspension
-        return -body.sprung_mass * body.arm / (body.roll_stiffness - body.sprung_mass * GRAVITY * body.arm)
-
     def steering_wheel_for(self, speed: float, lateral_acceleration: float) -> float:
         """Steering-wheel angle of a steady turn in the linear range, rad: i (L / R + K a_y)."""
         road_wheel = self.wheelbase / speed**2 + self.understeer_gradient
         return self.steering.ratio * road_wheel * lateral_acceleration
-
-    def yaw_rate_gain(self, speed: float) -> float:
-        """Steady yaw rate per steering-wheel angle in the linear range, 1/s: v / (i (L + K v^2))."""
-        return speed / (self.steering.ratio * (self.wheelbase + self.understeer_gradient * speed**2))
 
 
 # The cars of the package, by name.
@@ -315,18 +307,47 @@ E_CLASS_SUV: Final = Car(
 roll and pitch inertia are its sprung-mass data (from memory). Engineering choices: arm, 6 deg/g of roll
 at 1.2 Hz, 2.2 deg/g of pitch at 1.3 Hz (both damped with 0.28), friction, drivetrain, body sizes, seat."""
 
-_FLEET: Final = {car.name: car for car in (SEDAN, BMW_320I, VOLVO_V40, E_CLASS_SUV)}
+_CARS: Final[Registry[Any]] = Registry("car", "motion_cueing.cars")
+
+for _car in (SEDAN, BMW_320I, VOLVO_V40, E_CLASS_SUV):
+    _CARS.register(_car.name, _car, _car.description)
+
+
+def register(
+    name: str, car: Car | Callable[[], Car] | str, description: str = "", *, replace: bool = False
+) -> None:
+    """Give a car a name, which every command and configuration then knows.
+
+    An installed package can do the same by an entry point of the group ``motion_cueing.cars``.
+
+    Args:
+        name: What it is called, in tables, too.
+        car: A car, a function that makes it, or ``"module:attribute"`` where either is.
+        description: One line for lists; default: the car's own.
+        replace: Whether a name that is taken is given to the new one.
+
+    Raises:
+        ConfigurationError: the name is not one word, or is taken.
+    """
+    _CARS.register(name, car, description, replace=replace)
 
 
 def car_names() -> list[str]:
     """Names that :func:`get_car` knows, the paper's car first."""
-    return list(_FLEET)
+    return _CARS.names()
+
+
+def describe_car(name: str) -> str:
+    """One line about a car."""
+    return _CARS.description(name) or get_car(name).description
 
 
 def get_car(name: str) -> Car:
-    """A car of the package by name.
+    """A car by name.
 
     Raises:
         UnknownNameError: no such car; the message lists the nearest names.
     """
-    return look_up("car", name, _FLEET)
+    item = _CARS[name]
+    car: Car = item() if callable(item) else item
+    return car if car.name == name else replaced(car, name=name)

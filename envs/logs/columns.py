@@ -1,4 +1,4 @@
-"""Choices of an import: the rate, the filter, gaps, and what shall not be estimated."""
+"""Import options: which column of a log is which signal, and how it is resampled, filtered and mounted."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class ImportOptions:
         return cutoff_hz
 
 
-# Columns of a log: which column is which signal, in which unit, with which sign.
+# Columns: signal, unit and sign.
 
 
 FORCES: Final = ("force_x", "force_y", "force_z")

@@ -1,4 +1,9 @@
-"""How a device sits in a car: its attitude, and axes that are reversed."""
+"""Mounting of a device in a car: its attitude and reversed axes, estimated from the drive itself.
+
+Gravity gives roll and pitch. Horizontally the car's own motion is known twice: dv/dt along x and v r along
+y. The turn (and, for left-handed axes, the reflection) that fits the measured force to both gives yaw and
+the sense of y. The course gives the sense of r.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +71,7 @@ def level(rest: ArrayLike) -> tuple[float, float]:
     return float(np.arctan2(-y, -z)), float(np.arctan2(x, np.hypot(y, z)))
 
 
-# What a log shows about its own device: the smoothed signals an estimate looks at.
+# Evidence: the smoothed signals that an estimate uses.
 
 
 SMOOTHING_HZ: Final = 0.5
@@ -180,11 +185,7 @@ def correlation(a: Floats, b: Floats) -> float:
     return float(a @ b) / scale if scale > 0.0 else 0.0
 
 
-# Estimate of a mounting from the drive itself.
-#
-# Gravity gives roll and pitch. Horizontally the car's own motion is known twice: dv/dt along
-# x and v r along y; the turn (and, where the axes are left-handed, the reflection) that fits
-# the measured force to both gives yaw and the sense of y. The course gives the sense of r.
+# The estimate.
 
 
 CLEAR: Final = 0.3

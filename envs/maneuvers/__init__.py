@@ -1,13 +1,25 @@
-"""Drives: standard maneuvers, random drives and recorded drives."""
+"""Drives: standard maneuvers, random drives and recorded drives.
 
-from .maneuver import Maneuver
-from .random_drives import RandomDrives, drive_seeds, random_drive, random_drives
-from .recordings import get_recording, recording_names
-from .registry import get_maneuver, maneuver_names
+What needs the vehicle model is imported when it is asked for, so that names are listed at once.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .recordings import describe_recording, get_recording, recording_names
+from .registry import describe_maneuver, get_maneuver, maneuver_names, register
+
+if TYPE_CHECKING:
+    from .maneuver import Maneuver
+    from .random_drives import RandomDrives, drive_seeds, random_drive, random_drives
 
 __all__ = [
     "Maneuver",
     "RandomDrives",
+    "describe_maneuver",
+    "describe_recording",
     "drive_seeds",
     "get_maneuver",
     "get_recording",
@@ -15,4 +27,12 @@ __all__ = [
     "random_drive",
     "random_drives",
     "recording_names",
+    "register",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = "maneuver" if name == "Maneuver" else "random_drives"
+    return getattr(import_module(f"{__name__}.{module}"), name)

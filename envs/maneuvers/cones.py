@@ -1,4 +1,8 @@
-"""Cones on a test track: where a car's body may be, the smoothest way through, and how near it came."""
+"""Maneuvers between cones: both severe lane changes of ISO 3888 and the slalom.
+
+The driver plans the smoothest way through the gates that the car's body fits through, and learns from a first
+drive how far the car came from it.
+"""
 
 from __future__ import annotations
 
@@ -149,7 +153,7 @@ def clearance(trace: CueTrace, car: Car, gates: Sequence[Gate]) -> float:
     return least
 
 
-# Maneuvers between cones: both severe lane changes of ISO 3888, and the slalom.
+# The maneuvers.
 
 
 TEST_DRIVER = Driver(preview_time=0.7)
@@ -232,7 +236,6 @@ class DoubleLaneChange(ConeManeuver):
     """
 
     name: ClassVar[str] = "double-lane-change"
-    summary: ClassVar[str] = "severe double lane change at 80 km/h (ISO 3888-1)"
 
     offset: Positive = 3.5
 
@@ -260,7 +263,6 @@ class ObstacleAvoidance(ConeManeuver):
     """
 
     name: ClassVar[str] = "obstacle-avoidance"
-    summary: ClassVar[str] = "obstacle avoidance at 45 km/h (ISO 3888-2)"
 
     speed: Positive = 45.0 * KMH
     margin: Positive = 0.1
@@ -289,7 +291,6 @@ class Slalom(ConeManeuver):
     """
 
     name: ClassVar[str] = "slalom"
-    summary: ClassVar[str] = "slalom round cones 18 m apart at 50 km/h"
 
     speed: Positive = 50.0 * KMH
     margin: Positive = 0.2

@@ -1,4 +1,4 @@
-"""What every maneuver has: a name, parameters, a plan, and the drive that comes of it."""
+"""The maneuver: a name, parameters, a plan for a car, and the drive that results."""
 
 from __future__ import annotations
 
@@ -36,8 +36,6 @@ class Maneuver(ABC):
 
     name: ClassVar[str]
     """What it is called on the command line."""
-    summary: ClassVar[str]
-    """One line for lists and reports."""
 
     settle: Positive = 2.0
     calm: Positive = 3.0

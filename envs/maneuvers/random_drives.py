@@ -29,7 +29,7 @@ SHORTEST: Final = 0.1
 LONGEST: Final = 86_400.0
 """Of a drive, s: a day, some gigabyte of cues."""
 
-_UNEVENNESS_STREAM: Final = 1
+_ROUGHNESS_STREAM: Final = 1
 
 
 @configuration
@@ -40,7 +40,7 @@ class RandomDrives:
         urban: Relative frequency of urban drives.
         rural: Of rural drives.
         highway: Of highway drives.
-        track: Of fierce drives on a handling track.
+        track: Of hard drives on a handling track.
         hilly: Of drives over steep hills and crests.
         strip: Of drives with standing starts and full braking, far along a straight.
         cones: Of weaves, sudden bends and lane changes close to what tires hold.
@@ -90,11 +90,11 @@ class RandomDrives:
         if kind not in KINDS:
             raise UnknownNameError("kind of road", kind, KINDS)
         plan = _plan(f"{kind}-{seed}", car or get_car(drawn_car), kind, rng, duration)
-        return plan if self.roughness[1] == 0.0 else self._uneven(plan, seed)
+        return plan if self.roughness[1] == 0.0 else self._rough(plan, seed)
 
-    def _uneven(self, plan: Plan, seed: int) -> Plan:
-        """The plan on an uneven road, all else being as it was."""
-        rng = np.random.default_rng((seed, _UNEVENNESS_STREAM))
+    def _rough(self, plan: Plan, seed: int) -> Plan:
+        """The same plan on a rough road."""
+        rng = np.random.default_rng((seed, _ROUGHNESS_STREAM))
         roughness = 1e-6 * float(rng.uniform(*np.sqrt(self.roughness))) ** 2
         length = float(plan.schedule.distance[-1]) + plan.car.length
         return replace(plan, roughness=RoadRoughness.drawn(roughness, length, rng))

@@ -28,11 +28,16 @@ def recording_names() -> list[str]:
     return sorted(_SOURCES)
 
 
+def describe_recording(name: str) -> str:
+    """One line about a recorded drive, with its source."""
+    return look_up("recording", name, _SOURCES)
+
+
 def get_recording(name: str) -> CueTrace:
     """A recorded drive: 100 Hz, F_A axes, with the channel ``speed_m_s``.
 
     Raises:
         UnknownNameError: no recording has this name.
     """
-    source = look_up("recording", name, _SOURCES)
+    source = describe_recording(name)
     return replace(CueTrace.from_csv(_FOLDER / name / _FILE, name=name), source=source)

@@ -1,44 +1,65 @@
-"""The maneuvers of the package, by name."""
+"""Maneuvers by name, open to other packages; names and descriptions import no maneuver."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
 
-from ..errors import look_up
-from .cones import DoubleLaneChange, ObstacleAvoidance, Slalom
-from .maneuver import Maneuver
-from .standard import (
-    Acceleration,
-    Braking,
-    Hill,
-    LaneChange,
-    Roundabout,
-    SineWithDwell,
-    SteadyTurn,
-    StepSteer,
-    StopAndGo,
-)
+from ..registry import Registry
 
-_MANEUVERS: Final[tuple[type[Maneuver], ...]] = (
-    SteadyTurn,
-    Braking,
-    LaneChange,
-    Acceleration,
-    DoubleLaneChange,
-    ObstacleAvoidance,
-    Slalom,
-    StepSteer,
-    SineWithDwell,
-    StopAndGo,
-    Roundabout,
-    Hill,
-)
-_BY_NAME: Final = {maneuver.name: maneuver for maneuver in _MANEUVERS}
+if TYPE_CHECKING:
+    from .maneuver import Maneuver
+
+_MANEUVERS: Final[Registry[Any]] = Registry("maneuver", "motion_cueing.maneuvers")
+
+for _name, _where, _about in (
+    ("steady-turn", "standard:SteadyTurn", "60 km/h into a circle of 150 m (the paper's EST)"),
+    ("braking", "standard:Braking", "0.25 g from 80 km/h to a full stop (the paper's BRK)"),
+    ("lane-change", "standard:LaneChange", "one lane of 4 m at 60 km/h, 0.125 g (the paper's LC)"),
+    ("acceleration", "standard:Acceleration", "0.25 g from rest to 80 km/h"),
+    ("double-lane-change", "cones:DoubleLaneChange", "severe double lane change at 80 km/h (ISO 3888-1)"),
+    ("obstacle-avoidance", "cones:ObstacleAvoidance", "obstacle avoidance at 45 km/h (ISO 3888-2)"),
+    ("slalom", "cones:Slalom", "slalom round cones 18 m apart at 50 km/h"),
+    ("step-steer", "standard:StepSteer", "step of the steering wheel to 4 m/s^2 at 80 km/h (ISO 7401)"),
+    ("sine-with-dwell", "standard:SineWithDwell", "sine with dwell at 80 km/h (FMVSS 126)"),
+    ("stop-and-go", "standard:StopAndGo", "three stops in a queue, up to 40 km/h"),
+    ("roundabout", "standard:Roundabout", "roundabout of 18 m at 26 km/h, third exit, from and to 50 km/h"),
+    ("hill", "standard:Hill", "8 % up and down at 60 km/h"),
+):
+    _MANEUVERS.register(_name, f"{__package__}.{_where}", _about)
+
+
+def register(
+    name: str,
+    maneuver: Maneuver | Callable[[], Maneuver] | str,
+    description: str = "",
+    *,
+    replace: bool = False,
+) -> None:
+    """Give a maneuver a name, which every command and configuration then knows.
+
+    An installed package can do the same by an entry point of the group ``motion_cueing.maneuvers``.
+
+    Args:
+        name: What it is called.
+        maneuver: A :class:`~.maneuver.Maneuver`, its class, or ``"module:attribute"`` where either is.
+        description: One line for lists.
+        replace: Whether a name that is taken is given to the new one.
+
+    Raises:
+        ConfigurationError: the name is not one word, or is taken.
+    """
+    _MANEUVERS.register(name, maneuver, description, replace=replace)
 
 
 def maneuver_names() -> list[str]:
     """Names that :func:`get_maneuver` knows, the paper's three first."""
-    return list(_BY_NAME)
+    return _MANEUVERS.names()
+
+
+def describe_maneuver(name: str) -> str:
+    """One line about a maneuver."""
+    return _MANEUVERS.description(name)
 
 
 def get_maneuver(name: str) -> Maneuver:
@@ -47,4 +68,6 @@ def get_maneuver(name: str) -> Maneuver:
     Raises:
         UnknownNameError: no such maneuver; the message lists the nearest names.
     """
-    return look_up("maneuver", name, _BY_NAME)()
+    item = _MANEUVERS[name]
+    found: Maneuver = item() if callable(item) else item
+    return found

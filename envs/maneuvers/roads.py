@@ -1,4 +1,8 @@
-"""Speed along a path: as fast as bends and limits allow, with a driver's accelerations, and stops."""
+"""Random roads of several kinds, and the speed along a path.
+
+A road is stretches of curvature, speed limits and stops, one behind another. The speed is as high as bends
+and limits allow, with a driver's accelerations.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The three maneuvers of the paper: entry into a steady turn, braking to a stop, a single lane change."""
+"""Standard maneuvers: the paper's three, open-loop steering tests, and everyday traffic."""
 
 from __future__ import annotations
 
@@ -39,7 +39,6 @@ class SteadyTurn(Maneuver):
     """
 
     name: ClassVar[str] = "steady-turn"
-    summary: ClassVar[str] = "60 km/h into a circle of 150 m (the paper's EST)"
 
     speed: Positive = 60.0 * KMH
     radius: Positive = 150.0
@@ -67,7 +66,6 @@ class Braking(Maneuver):
     """
 
     name: ClassVar[str] = "braking"
-    summary: ClassVar[str] = "0.25 g from 80 km/h to a full stop (the paper's BRK)"
 
     settle: Positive = 2.5
     calm: Positive = 10.0
@@ -97,7 +95,6 @@ class LaneChange(Maneuver):
     """
 
     name: ClassVar[str] = "lane-change"
-    summary: ClassVar[str] = "one lane of 4 m at 60 km/h, 0.125 g (the paper's LC)"
 
     speed: Positive = 60.0 * KMH
     offset: Positive = 4.0
@@ -139,7 +136,6 @@ class StepSteer(Maneuver):
     """
 
     name: ClassVar[str] = "step-steer"
-    summary: ClassVar[str] = "step of the steering wheel to 4 m/s^2 at 80 km/h (ISO 7401)"
 
     speed: Positive = 80.0 * KMH
     lateral_acceleration: Positive = 4.0
@@ -174,7 +170,6 @@ class SineWithDwell(Maneuver):
     """
 
     name: ClassVar[str] = "sine-with-dwell"
-    summary: ClassVar[str] = "sine with dwell at 80 km/h (FMVSS 126)"
 
     speed: Positive = 80.0 * KMH
     frequency: Positive = 0.7
@@ -212,7 +207,6 @@ class Acceleration(Maneuver):
     """
 
     name: ClassVar[str] = "acceleration"
-    summary: ClassVar[str] = "0.25 g from rest to 80 km/h"
 
     speed: Positive = 80.0 * KMH
     acceleration: Positive = 0.25 * GRAVITY
@@ -242,7 +236,6 @@ class StopAndGo(Maneuver):
     """
 
     name: ClassVar[str] = "stop-and-go"
-    summary: ClassVar[str] = "three stops in a queue, up to 40 km/h"
 
     speeds: tuple[Positive, ...] = (15.0 * KMH, 25.0 * KMH, 40.0 * KMH)
     acceleration: Positive = 1.5
@@ -281,7 +274,6 @@ class Roundabout(Maneuver):
     """
 
     name: ClassVar[str] = "roundabout"
-    summary: ClassVar[str] = "roundabout of 18 m at 26 km/h, third exit, from and to 50 km/h"
 
     speed: Positive = 50.0 * KMH
     radius: Positive = 18.0
@@ -318,7 +310,6 @@ class Hill(Maneuver):
     """
 
     name: ClassVar[str] = "hill"
-    summary: ClassVar[str] = "8 % up and down at 60 km/h"
 
     speed: Positive = 60.0 * KMH
     grade: Positive = math.atan(0.08)

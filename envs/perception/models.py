@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from ..errors import look_up
+from ..registry import Registry
 from ..settings import NonNegative, Positive, Vector3, configuration
 
 
@@ -82,23 +82,42 @@ class VestibularModel:
     source: str
 
 
-_MODELS: Final = {
-    model.name: model
-    for model in (
-        VestibularModel(
-            name="zacharias",
-            canals=Canals(long=(6.1, 5.3, 10.2), short=0.1, adaptation=30.0),
-            otoliths=Otoliths(lead=13.2, long=5.33, short=0.66),
-            source="canals: Zacharias, in the form of Reid and Nahon; otoliths: Young and Meiry",
-        ),
-        VestibularModel(
-            name="telban",
-            canals=Canals(long=(5.73, 5.73, 5.73), short=0.005, adaptation=80.0, lead=0.06),
-            otoliths=Otoliths(lead=10.0, long=5.0, short=0.016),
-            source="Telban and Cardullo, NASA/CR-2005-213747",
-        ),
-    )
-}
+_MODELS: Final[Registry[VestibularModel]] = Registry("vestibular model", "motion_cueing.vestibular_models")
+
+for _model in (
+    VestibularModel(
+        name="zacharias",
+        canals=Canals(long=(6.1, 5.3, 10.2), short=0.1, adaptation=30.0),
+        otoliths=Otoliths(lead=13.2, long=5.33, short=0.66),
+        source="canals: Zacharias, in the form of Reid and Nahon; otoliths: Young and Meiry",
+    ),
+    VestibularModel(
+        name="telban",
+        canals=Canals(long=(5.73, 5.73, 5.73), short=0.005, adaptation=80.0, lead=0.06),
+        otoliths=Otoliths(lead=10.0, long=5.0, short=0.016),
+        source="Telban and Cardullo, NASA/CR-2005-213747",
+    ),
+):
+    _MODELS.register(_model.name, _model, _model.source)
+
+
+def register(
+    name: str, model: VestibularModel | str, description: str = "", *, replace: bool = False
+) -> None:
+    """Give a perception model a name, which every configuration then knows.
+
+    An installed package can do the same by an entry point of the group ``motion_cueing.vestibular_models``.
+
+    Args:
+        name: What it is called.
+        model: A model, or ``"module:attribute"`` where it is.
+        description: One line for lists.
+        replace: Whether a name that is taken is given to the new one.
+
+    Raises:
+        ConfigurationError: the name is not one word, or is taken.
+    """
+    _MODELS.register(name, model, description, replace=replace)
 
 
 def vestibular_model_names() -> list[str]:
@@ -112,7 +131,7 @@ def get_vestibular_model(name: str) -> VestibularModel:
     Raises:
         UnknownNameError: no set has this name.
     """
-    return look_up("vestibular model", name, _MODELS)
+    return _MODELS[name]
 
 
 @dataclass(frozen=True)

@@ -1,43 +1,158 @@
-"""Inverse and forward kinematics of a configured hexapod, for people: NumPy in, NumPy out."""
+"""Kinematics of a hexapod in NumPy, for everything outside the kernels: rotations, legs, poses, reach.
+
+A pose is [x, y, z, roll, pitch, yaw] of the platform from neutral, m and rad. A leg is
+l = L_IH A - B + S_0 + s, Eq. (12); its length changes at l . (ds/dt + omega x L_IH A) / |l|.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
+from typing import Final, NamedTuple
 
 import numpy as np
-import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import FLOAT, vec3, vec6
 from ..errors import DataError, GeometryError
-from .kernels.geometry import HexapodGeometry, forward_kinematics, leg_extensions
 from .machines import Hexapod
-from .parameters import geometry_of
 
-_CLOSED = 1e-9 if FLOAT is np.float64 else 1e-5
+Floats = NDArray[np.float64]
+
+NEARLY_SINGULAR: Final = 0.15
+"""Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
+
+_LEAST_CONDITION: Final = 1e-3
+"""Least ratio of the neutral Jacobian's singular values (lengths over the joint radius)."""
+
+_NEWTON_ITERATIONS: Final = 20
+"""More than Newton ever needs from a neighboring pose (3 to 5)."""
+
+_NEWTON_TOLERANCE: Final = 1e-13
+"""Largest leg error at which the iteration stops, m."""
+
+_CLOSED: Final = 1e-9
 """Largest leg error of a pose that closes, m."""
 
 
-@wp.kernel(enable_backward=False, module="unique")
-def _inverse(g: HexapodGeometry, pose: wp.array(dtype=vec6), extensions: wp.array(dtype=vec6)) -> None:
-    i = wp.tid()
-    p = pose[i]
-    extensions[i] = leg_extensions(g, vec3(p[0], p[1], p[2]), vec3(p[3], p[4], p[5]))
+def rotation(angles: ArrayLike) -> Floats:
+    """Eq. (4): (..., 3, 3) L_IB = Rx(roll) Ry(pitch) Rz(yaw) of Euler angles (..., 3)."""
+    (sp, st, ss), (cp, ct, cs) = _sines_cosines(angles)
+    rows = [
+        [ct * cs, -ct * ss, st],
+        [cp * ss + sp * st * cs, cp * cs - sp * st * ss, -sp * ct],
+        [sp * ss - cp * st * cs, sp * cs + cp * st * ss, cp * ct],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-@wp.kernel(enable_backward=False, module="unique")
-def _forward(
-    g: HexapodGeometry,
-    extensions: wp.array(dtype=vec6),
-    guess: wp.array(dtype=vec6),
-    pose: wp.array(dtype=vec6),
-) -> None:
-    i = wp.tid()
-    p = guess[i]
-    pose[i] = forward_kinematics(g, extensions[i], vec3(p[0], p[1], p[2]), vec3(p[3], p[4], p[5]))
+def turning_axes(angles: ArrayLike) -> Floats:
+    """(..., 3, 3) whose product with Euler rates is the angular velocity in inertial axes, L_IB R_B.
+
+    Its columns: roll turns about x, pitch about Rx y, yaw about Rx Ry z.
+    """
+    (sp, st, _), (cp, ct, _) = _sines_cosines(angles)
+    zero = np.zeros_like(sp)
+    rows = [[zero + 1.0, zero, st], [zero, cp, -sp * ct], [zero, sp, cp * ct]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def _sixes(label: str, values: ArrayLike) -> NDArray[np.float64]:
+def _sines_cosines(angles: ArrayLike) -> tuple[Floats, Floats]:
+    first = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
+    return np.sin(first), np.cos(first)
+
+
+def leg_vectors(hexapod: Hexapod, pose: Floats) -> tuple[Floats, Floats]:
+    """Eq. (12), each (..., 6, 3) in F_V, m: A_i from the origin of F_H, and the legs from B_i to A_i."""
+    arms = np.array(hexapod.upper_joints) @ np.swapaxes(rotation(pose[..., 3:]), -1, -2)
+    origin = np.array(hexapod.neutral) + pose[..., :3]
+    return arms, arms + origin[..., None, :] - np.array(hexapod.lower_joints)
+
+
+class LegMotion(NamedTuple):
+    """Legs of moving poses.
+
+    Args:
+        extension: (..., 6) from neutral, m.
+        rate: (..., 6) m/s.
+        clearance: (...) det of the Jacobian over that at neutral: 0 in a singular pose, negative behind it.
+    """
+
+    extension: Floats
+    rate: Floats
+    clearance: Floats
+
+
+def leg_motion(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> LegMotion:
+    """Extensions and rates of the legs of poses (..., 6) and their rates (..., 6), and the clearance."""
+    arms, legs = leg_vectors(hexapod, pose)
+    jacobian = leg_jacobian(arms, legs)
+    omega = turning_axes(pose[..., 3:]) @ pose_rate[..., 3:, None]
+    twist = np.concatenate([pose_rate[..., :3, None], omega], axis=-2)
+    return LegMotion(
+        np.linalg.norm(legs, axis=-1) - hexapod.neutral_lengths,
+        (jacobian @ twist)[..., 0],
+        np.linalg.det(jacobian) / np.linalg.det(neutral_jacobian(hexapod)),
+    )
+
+
+def leg_jacobian(arms: Floats, legs: Floats) -> Floats:
+    """(..., 6, 6) leg rates for the platform's velocity and angular velocity, both in F_V.
+
+    Args:
+        arms: (..., 6, 3) A_i from the origin of F_H, in F_V, m.
+        legs: (..., 6, 3) from B_i to A_i, in F_V, m.
+    """
+    directions = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
+    return np.concatenate([directions, np.cross(arms, directions)], axis=-1)
+
+
+def neutral_jacobian(hexapod: Hexapod) -> Floats:
+    """(6, 6) the Jacobian at neutral, where L_IH is unity."""
+    upper = np.array(hexapod.upper_joints)
+    return leg_jacobian(upper, upper - np.array(hexapod.lower_joints) + np.array(hexapod.neutral))
+
+
+def legs_of_pose(hexapod: Hexapod, pose: ArrayLike) -> Floats:
+    """Inverse kinematics, Eqs. (12), (13): extensions (..., 6), m, of poses (..., 6).
+
+    Raises:
+        DataError: not six finite numbers, or rows of them.
+    """
+    _, legs = leg_vectors(hexapod, _sixes("pose", pose))
+    return np.asarray(np.linalg.norm(legs, axis=-1) - hexapod.neutral_lengths)
+
+
+def pose_of_legs(hexapod: Hexapod, extensions: ArrayLike, guess: ArrayLike = (0.0,) * 6) -> Floats:
+    """Forward kinematics: poses (..., 6) with these leg extensions, m, by Newton iteration from ``guess``.
+
+    Raises:
+        DataError: not six finite numbers, or rows of them.
+        GeometryError: no pose near ``guess`` has these legs.
+    """
+    target = _sixes("extensions", extensions)
+    pose = np.broadcast_to(_sixes("guess", guess), target.shape).copy()
+    error = np.full_like(target, np.inf)
+    # What does not close runs away; it is refused below.
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON_ITERATIONS):
+            arms, legs = leg_vectors(hexapod, pose)
+            error = target - (np.linalg.norm(legs, axis=-1) - hexapod.neutral_lengths)
+            if not np.abs(error).max() > _NEWTON_TOLERANCE:
+                break
+            jacobian = leg_jacobian(arms, legs)
+            jacobian[..., 3:] = jacobian[..., 3:] @ turning_axes(pose[..., 3:])
+            try:
+                pose = pose + np.linalg.solve(jacobian, error[..., None])[..., 0]
+            except np.linalg.LinAlgError:
+                break
+    if not np.abs(error).max() <= _CLOSED:
+        raise GeometryError(
+            "no pose near the first guess has these leg extensions: the legs cannot close, "
+            "or the way there passes a singular pose"
+        )
+    return pose
+
+
+def _sixes(label: str, values: ArrayLike) -> Floats:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim not in (1, 2) or array.shape[-1] != 6:
         raise DataError(f"{label} must be 6 numbers, or (n, 6); found shape {array.shape}")
@@ -46,32 +161,84 @@ def _sixes(label: str, values: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def _launch(kernel: Any, hexapod: Hexapod, *inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-    n = inputs[0].reshape(-1, 6).shape[0]
-    arrays = [wp.array(np.broadcast_to(x, (n, 6)), dtype=vec6, device="cpu") for x in inputs]
-    result = wp.zeros(n, dtype=vec6, device="cpu")
-    wp.launch(kernel, n, inputs=[geometry_of(hexapod), *arrays], outputs=[result], device="cpu")
-    return np.asarray(result.numpy(), dtype=np.float64).reshape(inputs[0].shape)
-
-
-def legs_of_pose(hexapod: Hexapod, pose: ArrayLike) -> NDArray[np.float64]:
-    """Eqs. (12), (13): extensions (..., 6), m, of poses [x, y, z, roll, pitch, yaw], m and rad."""
-    return _launch(_inverse, hexapod, _sixes("pose", pose))
-
-
-def pose_of_legs(
-    hexapod: Hexapod, extensions: ArrayLike, guess: ArrayLike = (0.0,) * 6
-) -> NDArray[np.float64]:
-    """Poses (..., 6) with these leg extensions, m: forward kinematics by Newton iteration from ``guess``.
+def check_geometry(hexapod: Hexapod) -> None:
+    """Refuse a hexapod that does not hold its platform at neutral.
 
     Raises:
-        GeometryError: no pose near ``guess`` has these legs.
+        GeometryError: the platform is below its base, or the Jacobian at neutral is singular: legs are
+            parallel or all meet one line.
     """
-    target = _sixes("extensions", extensions)
-    pose = _launch(_forward, hexapod, target, _sixes("guess", guess))
-    if not np.isfinite(pose).all() or np.abs(legs_of_pose(hexapod, pose) - target).max() > _CLOSED:
+    radius = float(np.mean(np.linalg.norm(hexapod.upper_joints, axis=1)))
+    if radius == 0.0:
         raise GeometryError(
-            "no pose near the first guess has these leg extensions: the legs cannot close, "
-            "or the way there passes a singular pose"
+            "hexapod.upper_joints: all joints lie in the origin of F_H; give the six places where the legs "
+            "meet the platform, in m"
         )
-    return pose
+    height = float(np.mean(np.array(hexapod.upper_joints) - np.array(hexapod.lower_joints), axis=0)[2])
+    if height + hexapod.neutral[2] > 0.0:
+        raise GeometryError(
+            f"hexapod.neutral: with z = {hexapod.neutral[2]:g} the platform lies below its base; z points "
+            "down, so give a negative number"
+        )
+    scaled = neutral_jacobian(hexapod) / np.array([1.0, 1.0, 1.0, radius, radius, radius])
+    values = np.linalg.svd(scaled, compute_uv=False)
+    if not values[-1] > _LEAST_CONDITION * values[0]:
+        raise GeometryError(
+            "the hexapod is singular at neutral (smallest over largest singular value "
+            f"{values[-1] / values[0]:.1e}): move upper_joints, lower_joints or neutral so that the legs "
+            "are not parallel and do not all meet one line"
+        )
+
+
+# How far the platform goes from neutral along each axis by itself.
+
+
+_POSES: Final = 61
+"""Poses looked at on the way, so that the first that is out of reach is found."""
+
+_LOOKS: Final = 4
+"""Looks, each between the last pose that was within reach and the first that was not."""
+
+_LARGEST_ANGLE: Final = 0.5 * np.pi
+"""Angles are looked at up to here: Euler angles are singular at a pitch of +-90 degrees."""
+
+_ROUNDING: Final = 1e-12
+"""Of a leg's length, m."""
+
+_SIGNS: Final = np.tile([-1.0, 1.0], 6)
+_AXES: Final = np.repeat(np.arange(6), 2)
+"""The twelve ways: each axis down, then up."""
+
+
+def axis_reach(hexapod: Hexapod) -> Floats:
+    """(6, 2) how far down and up surge, sway, heave (m), roll, pitch, yaw (rad) go, both as distances.
+
+    From neutral along one axis, until a leg is at its end or the pose nearly singular.
+    """
+    return np.array(_reach(hexapod)).reshape(6, 2)
+
+
+@lru_cache(maxsize=1024)
+def _reach(hexapod: Hexapod) -> tuple[float, ...]:
+    longest = float(hexapod.neutral_lengths.max()) + hexapod.extension[1]
+    far = np.where(_AXES < 3, longest, _LARGEST_ANGLE)
+    low, high, ways = np.zeros(12), np.ones(12), np.arange(12)
+    for _ in range(_LOOKS):
+        shares = np.linspace(low, high, _POSES)
+        within = _holds(hexapod, shares * far)
+        # Where all hold the way has no end within what is looked at.
+        last = np.where(within.all(axis=0), _POSES - 1, np.argmin(within, axis=0) - 1)
+        low, high = shares[last, ways], shares[np.minimum(last + 1, _POSES - 1), ways]
+    return tuple((low * far).tolist())
+
+
+def _holds(hexapod: Hexapod, distances: Floats) -> NDArray[np.bool_]:
+    """(k, 12) whether poses at distances (k, 12) are within the legs' travel and clear of singular ones."""
+    poses = np.where(_AXES[:, None] == np.arange(6), (_SIGNS * distances)[..., None], 0.0)
+    arms, legs = leg_vectors(hexapod, poses)
+    extensions = np.linalg.norm(legs, axis=-1) - hexapod.neutral_lengths
+    # Lengths at neutral are not always their own to the last bit; no travel may be without neutral.
+    lowest, highest = hexapod.extension[0] - _ROUNDING, hexapod.extension[1] + _ROUNDING
+    in_travel = np.all((extensions >= lowest) & (extensions <= highest), axis=-1)
+    clearance = np.linalg.det(leg_jacobian(arms, legs)) / np.linalg.det(neutral_jacobian(hexapod))
+    return np.asarray(in_travel & (clearance >= NEARLY_SINGULAR))

@@ -1,18 +1,46 @@
-"""Machines as configurations: carriage, hexapod, turntable and cab, in SI units."""
+"""Configuration of a motion base: carriage, hexapod, turntable and cab, with limits and actuators, in SI."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from ..errors import ConfigurationError
-from ..settings import Positive, Vector2, Vector3, configuration
-from .kernels.step import ActuatorDynamics
+from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
 
 Joints = Annotated[tuple[Vector3, ...], Field(min_length=6, max_length=6)]
+ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "leg_5", "leg_6", "turntable")
+"""Names of the nine actuators."""
+
+AXES = ("carriage_x", "carriage_y", "surge", "sway", "heave", "roll", "pitch", "yaw", "turntable")
+"""Names of the nine degrees of freedom an action commands, in its order."""
+
+UNLIMITED: Final = 1e9
+"""Travel of an unlimited turntable in the kernels, rad: finite, so that no infinity meets a zero."""
+
+LOCKED: Final = 1.0
+"""Velocity and acceleration limit of a missing subsystem, whose travel is zero."""
+
+
+@configuration
+class ActuatorDynamics:
+    """Second-order lag and dead time of one subsystem.
+
+    Args:
+        natural_frequency: omega, rad/s; None for no lag (unity).
+        damping: zeta, at least 1 so that no limit is overshot.
+        dead_time: Pure delay, s; rounded to whole time steps.
+    """
+
+    natural_frequency: Positive | None = None
+    damping: Annotated[float, Field(ge=1.0)] = 1.0
+    dead_time: NonNegative = 0.0
+
+
 UNITY = ActuatorDynamics()
 
 
@@ -142,3 +170,30 @@ class Platform:
     def without_turntable(self) -> Platform:
         """The same machine with its turntable locked at 0."""
         return replace(self, name=f"{self.name}, no turntable", turntable=None)
+
+
+def limits_of(platform: Platform) -> dict[str, NDArray[np.float64]]:
+    """position_min, position_max, velocity, acceleration, each (9,) in the order of :data:`ACTUATORS`.
+
+    A missing subsystem has no travel, an unlimited turntable :data:`UNLIMITED`.
+    """
+    carriage, hexapod, turntable = platform.carriage, platform.hexapod, platform.turntable
+    low, high = np.zeros(9), np.zeros(9)
+    velocity, acceleration = np.full(9, LOCKED), np.full(9, LOCKED)
+    if carriage is not None:
+        low[:2], high[:2] = np.array([carriage.travel_x, carriage.travel_y]).T
+        velocity[:2], acceleration[:2] = carriage.velocity, carriage.acceleration
+    low[2:8], high[2:8] = hexapod.extension
+    velocity[2:8], acceleration[2:8] = hexapod.velocity, hexapod.acceleration
+    if turntable is not None:
+        low[8], high[8] = turntable.travel or (-UNLIMITED, UNLIMITED)
+        velocity[8], acceleration[8] = turntable.velocity, turntable.acceleration
+    return {"position_min": low, "position_max": high, "velocity": velocity, "acceleration": acceleration}
+
+
+def actuator_limits(platform: Platform) -> dict[str, NDArray[np.float64]]:
+    """position_min, position_max, velocity, acceleration, each (9,), for people: unlimited is infinite."""
+    limits = limits_of(platform)
+    limits["position_min"][limits["position_min"] <= -UNLIMITED] = -np.inf
+    limits["position_max"][limits["position_max"] >= UNLIMITED] = np.inf
+    return limits

@@ -1,19 +1,23 @@
-"""Machines with a subsystem locked: what does each of them buy?"""
+"""Platforms by name: the paper's machine, real ones for comparison, and each with subsystems locked.
+
+Figures marked (m) are class values or from the literature as remembered, not read off a data sheet.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import replace as replaced
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from ..errors import GeometryError, UnknownNameError
+from ..registry import Registry
 from ..settings import Vector3, load
+from .kinematics import check_geometry
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
-from .parameters import check_geometry
 
 
 def _without_turntable(platform: Platform) -> Platform | None:
@@ -54,13 +58,8 @@ def ablations(platform: Platform) -> list[Platform]:
         left = take(platform)
         if left is not None:
             about = f"{platform.name} with {_LEFT[suffix]}"
-            found.append(replace(left, name=f"{platform.name}-{suffix}", description=about))
+            found.append(replaced(left, name=f"{platform.name}-{suffix}", description=about))
     return found
-
-
-# Machines by name: the paper's, and real ones for comparison.
-#
-# Figures marked (m) are class values or from the literature as remembered, not read off a data sheet.
 
 
 _PAPER_UPPER: Final = (
@@ -206,17 +205,39 @@ def nads_1() -> Platform:
     )
 
 
-_PRESETS: Final[dict[str, Callable[[], Platform]]] = {
-    "paper": paper,
-    "dim-hexapod": dim_hexapod,
-    "24-inch": table_24_inch,
-    "nads-1": nads_1,
-}
+_PLATFORMS: Final[Registry[Any]] = Registry("platform", "motion_cueing.platforms")
+
+for _preset in (paper, dim_hexapod, table_24_inch, nads_1):
+    _platform = _preset()
+    _PLATFORMS.register(_platform.name, _platform, _platform.description)
+
+
+def register(
+    name: str,
+    platform: Platform | Callable[[], Platform] | str,
+    description: str = "",
+    *,
+    replace: bool = False,
+) -> None:
+    """Give a platform a name, which every command and configuration then knows.
+
+    An installed package can do the same by an entry point of the group ``motion_cueing.platforms``.
+
+    Args:
+        name: What it is called, in tables, too.
+        platform: A platform, a function that makes it, or ``"module:attribute"`` where either is.
+        description: One line for lists; default: the platform's own.
+        replace: Whether a name that is taken is given to the new one.
+
+    Raises:
+        ConfigurationError: the name is not one word, or is taken.
+    """
+    _PLATFORMS.register(name, platform, description, replace=replace)
 
 
 def platform_names() -> list[str]:
     """Names of whole machines that :func:`get_platform` knows."""
-    return list(_PRESETS)
+    return _PLATFORMS.names()
 
 
 def ablation_names() -> list[str]:
@@ -225,20 +246,28 @@ def ablation_names() -> list[str]:
 
 
 def _ablated() -> dict[str, Platform]:
-    return {platform.name: platform for make in _PRESETS.values() for platform in ablations(make())}
+    return {platform.name: platform for name in _PLATFORMS for platform in ablations(get_platform(name))}
+
+
+def describe_platform(name: str) -> str:
+    """One line about a platform or an ablation."""
+    described = _PLATFORMS.description(name) if name in _PLATFORMS else ""
+    return described or get_platform(name).description
 
 
 def get_platform(name: str) -> Platform:
     """A machine by name; -no-turntable, -no-carriage or -hexapod-only at its end locks subsystems.
 
     Raises:
-        UnknownNameError: no preset has this name.
+        UnknownNameError: no platform has this name.
     """
-    if name in _PRESETS:
-        return _PRESETS[name]()
+    if name in _PLATFORMS:
+        item = _PLATFORMS[name]
+        platform: Platform = item() if callable(item) else item
+        return platform if platform.name == name else replaced(platform, name=name)
     ablated = _ablated()
     if name not in ablated:
-        raise UnknownNameError("platform", name, [*_PRESETS, *ablated])
+        raise UnknownNameError("platform", name, [*platform_names(), *ablated])
     return ablated[name]
 
 

@@ -1,4 +1,4 @@
-"""Machines of other builds: drawn around one, so that a policy learns what a machine is."""
+"""Platform randomization: machines drawn around a given one, so that a policy learns what a machine is."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pydantic import Field
 
 from ..errors import ConfigurationError
 from ..settings import Positive, Vector2, Vector3, configuration
+from .kinematics import check_geometry
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
-from .parameters import check_geometry
 
 Range = tuple[Positive, Positive]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -60,7 +60,7 @@ class PlatformRanges:
 def random_platform(
     platform: Platform, ranges: PlatformRanges, rng: np.random.Generator, name: str
 ) -> Platform:
-    """A machine of another build that holds its platform at neutral.
+    """A machine drawn around another one that holds its platform at neutral.
 
     Args:
         platform: The one it is drawn around.
@@ -78,9 +78,9 @@ def random_platform(
         except ConfigurationError as error:
             reason = error
             continue
-        return replace(made, name=name, description=f"{platform.name} in another build")
+        return replace(made, name=name, description=f"{platform.name}, randomized")
     raise ConfigurationError(
-        f"randomization.build: none of {_TRIES} machines drawn around {platform.name!r} closes, the last one "
+        f"randomization.platform: none of {_TRIES} machines drawn around {platform.name!r} closes, the last "
         f"because {reason}; narrow size, shape or travel"
     )
 

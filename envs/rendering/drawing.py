@@ -1,4 +1,4 @@
-"""pygame, imported when a picture is first wanted."""
+"""Drawing with pygame: camera, meshes, shading, and a flat surface for shapes and text."""
 
 from __future__ import annotations
 

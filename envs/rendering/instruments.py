@@ -1,4 +1,4 @@
-"""The last seconds of what a driver should feel and does feel, and J over the whole drive."""
+"""The panel beside the machine: cues of the last seconds, J so far, and the use of travel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rigid parts of a machine as meshes, each in its own frame; sizes follow the hexapod's."""
+"""The motion base as meshes: rigid parts, each in its own frame, and the legs; sizes follow the hexapod's."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..platform.kinematics import rotation
 from ..platform.machines import Carriage, Hexapod, Platform
 from . import theme
 from .drawing import Mesh, along, box, circle, joined, mesh, prism, ring_walls, sphere
-from .motion_view import rotation
 from .surroundings import LENGTH, dashboard, driver_figure, seat, seat_back, shell, steering_wheel, wheels
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Where a machine stands at a moment, and the points and frames of its parts."""
+"""Pose of a motion base at a moment, and the points and frames of its parts."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DataError
+from ..platform.kinematics import rotation
 from ..platform.machines import Platform
 
 Floats = NDArray[np.float64]
@@ -58,15 +59,6 @@ class Frame:
 def neutral_view() -> MotionView:
     """A machine at rest in the middle."""
     return MotionView(np.zeros(2), np.zeros(6), 0.0, np.zeros(6))
-
-
-def rotation(beta: Floats) -> Floats:
-    """Eq. (4): (3, 3) L_IB = Rx(phi) Ry(theta) Rz(psi)."""
-    (sp, st, ss), (cp, ct, cs) = np.sin(beta), np.cos(beta)
-    roll = np.array([[1.0, 0.0, 0.0], [0.0, cp, -sp], [0.0, sp, cp]])
-    pitch = np.array([[ct, 0.0, st], [0.0, 1.0, 0.0], [-st, 0.0, ct]])
-    yaw = np.array([[cs, -ss, 0.0], [ss, cs, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(roll @ pitch @ yaw)
 
 
 def carriage_frame(motion: MotionView) -> Frame:

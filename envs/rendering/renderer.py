@@ -1,4 +1,4 @@
-"""What a simulator's state says to a renderer."""
+"""The renderer: pictures of a simulator's state, the machine in its hall beside the panel of cues."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ class Renderer:
 
         Args:
             motion: Where the machine stands.
-            cues: What is wanted and felt; its last sample is drawn as arrows at the driver's head.
+            cues: Reference and simulator cues; the last sample is drawn as arrows at the driver's head.
         """
         self._stage.blit(self._backdrop, (0, 0))
         arrows = Arrows(cues.reference_cue[-1, :3], cues.simulator_cue[-1, :3]) if len(cues) else None

@@ -1,6 +1,7 @@
-"""The cab: a small car's body, lofted over cross-sections, with wheels and what stands inside.
+"""What stands around and on the machine: the cab, its driver, and the floor of the hall.
 
-It stands on the plane z = 0 of its own frame, x forward, the middle of its length near the origin.
+The cab is a small car's body, lofted over cross-sections. It stands on the plane z = 0 of its own frame, x
+forward, the middle of its length near the origin.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Colors and light: a calm dark studio, in which what moves and what is felt stand out."""
+"""Colors and light of the pictures."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ TAIL_LIGHT: Final[Color] = (206, 52, 46)
 
 REFERENCE: Final[Color] = (242, 244, 247)
 SIMULATOR: Final[Color] = (86, 180, 233)
-"""Okabe and Ito's sky blue: told apart from white and from the colors of use by everyone."""
+"""Okabe and Ito's sky blue: everyone can distinguish it from white and from the colors of use."""
 
 PANEL: Final[Color] = (22, 27, 35)
 CARD: Final[Color] = (29, 35, 45)

@@ -1,4 +1,7 @@
-"""Device arrays as plain bytes, to put a batch back where it was."""
+"""The simulator: a batch of motion bases, each driven through its own drive, and snapshots of it.
+
+Every environment, evaluation and real-time loop runs on it.
+"""
 
 from __future__ import annotations
 
@@ -45,9 +48,6 @@ def put_bytes(array: Any, name: str, snapshot: Mapping[str, NDArray[Any]]) -> No
     array.assign(np.frombuffer(data.tobytes(), dtype=like.dtype).reshape(like.shape))
 
 
-# A batch of machines, each driven through its own drive: the core every environment and rollout runs on.
-
-
 TIME_STEP: Final = 0.01
 """Time step of the machine and its policies, s."""
 
@@ -61,7 +61,7 @@ N_AXES: Final = 9
 class Simulator:
     """A batch of environments stepped together; each has its own machine, drive, time and start.
 
-    One environment is a batch of one row. Arrays are kept in two copies, and a step goes from one to the
+    One environment is a batch of one row. There are two copies of the arrays, and a step goes from one to the
     other, so the state before a step stays readable until the next.
 
     Args:

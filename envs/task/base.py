@@ -1,6 +1,6 @@
-"""A base policy under the agent: it acts, and the agent corrects it or turns its knobs.
+"""The base policy under an agent: it acts, and the agent corrects it (residual) or sets its gains.
 
-Any policy that follows Stable-Baselines3's convention can be one; this package does not know which there are.
+Any policy that follows Stable-Baselines3's convention can be one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ConfigurationError
 from ..platform.kernels.step import AXES
 from ..simulator.simulator import Snapshot
-from .options import Mode
+from .kernels.action import Mode
 
 Array = NDArray[Any]
 

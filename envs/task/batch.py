@@ -1,4 +1,7 @@
-"""The recorded launches of a batch: each kernel with its arrays, once for each copy of the state."""
+"""A batch of environments without an interface, on which the single, the vector and other environments run.
+
+Each kernel is a recorded launch with its arrays, once for each copy of the simulator's state.
+"""
 
 from __future__ import annotations
 
@@ -16,25 +19,24 @@ from ..perception.models import get_vestibular_model
 from ..platform.machines import Platform
 from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
-from . import draws
 from .base import Base
 from .drives import library_of, machines_of
-from .kernels.action import MODES, ActionScale, AxisScale
-from .kernels.episode import Arrays, Command, Rules, forget, look, play
-from .kernels.observation import (
+from .episode import (
     DRIVE,
     MACHINE_STREAM,
-    Episode,
     draw,
     fill_episodes,
-    places_of,
+    key_of,
     pose_scale,
     start_poses,
     start_samples,
+    uniform,
 )
-from .kernels.reward import reward_scale, vec_terms
-from .observation import Layout, ability_of, action_scale, free_axes, layout_of, low_passed, velocity_scale
-from .options import ActionOptions, TaskOptions
+from .kernels.action import action_scale, action_scales
+from .kernels.episode import Arrays, Command, Rules, forget, look, play
+from .kernels.observation import Episode, Layout, ability_of, layout_of, low_passed, view_of
+from .kernels.reward import reward_of, vec_terms
+from .options import TaskOptions
 
 NOTHING, CORE, FRAME, ALL = range(4)
 """Parts of an observation, as the kernels number them."""
@@ -97,36 +99,18 @@ class BatchArrays:
         return arrays
 
 
-def _axis_scale(platform: Platform, options: ActionOptions) -> Any:
-    """The kernel's form of what an action of 1 stands for on a machine."""
-    scale: Any = AxisScale()
-    largest = action_scale(platform, options)
-    scale.acceleration, scale.jerk = vec9(*largest), vec9(*largest / options.rise_time)
-    scale.velocity = vec9(*velocity_scale(platform))
-    return scale
-
-
-def _actions(platforms: Sequence[Platform], options: ActionOptions, device: Any) -> Any:
-    """The kernel's form of what an action stands for."""
-    scale: Any = ActionScale()
-    scale.mode, scale.free = MODES[options.mode], vec9(*free_axes(options.frozen))
-    axes = [_axis_scale(platform, options) for platform in platforms]
-    scale.axes = wp.array(axes, dtype=AxisScale, device=device)
-    scale.cab_frame = int(options.frame == "cab")
-    return scale
-
-
 def rules_of(
     options: TaskOptions, layout: Layout, platforms: Sequence[Platform], dt: float, device: Any
 ) -> Any:
     """What is the same for a whole batch, as the kernels read it."""
     rules: Any = Rules()
-    rules.action = _actions(platforms, options.action, device)
-    rules.reward = reward_scale(options.reward, options.episode.terminate_on_failure)
-    rules.places = places_of(layout, options.observation, dt, options.randomization)
+    rules.action = action_scales(platforms, options.action, device)
+    rules.reward = reward_of(options.reward, options.episode.terminate_on_failure)
+    noise = options.randomization.force_noise, options.randomization.rate_noise
+    rules.view = view_of(layout, options.observation, dt, noise)
     if options.observation.machine:
         abilities = np.array([ability_of(platform) for platform in platforms])
-        rules.places.abilities = wp.array(abilities, dtype=wp.float32, device=device)
+        rules.view.abilities = wp.array(abilities, dtype=wp.float32, device=device)
     rules.share, rules.dt = 1.0 / options.action.repeat, dt
     return rules
 
@@ -176,9 +160,6 @@ class Launches:
     def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> None:
         n, device = self._simulator.n, self._simulator.device
         self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)
-
-
-# A batch of environments without an interface: what the single, the vector and other environments share.
 
 
 Mask = NDArray[np.bool_]
@@ -242,7 +223,7 @@ class Batch:
     def seed(self, mask: Mask, seeds: Sequence[int]) -> None:
         """Give the masked environments seeds (one for each environment of the batch), and start over."""
         chosen = np.flatnonzero(mask)
-        self._keys[chosen] = [draws.key_of(seeds[i]) for i in chosen.tolist()]
+        self._keys[chosen] = [key_of(seeds[i]) for i in chosen.tolist()]
         self._episodes[chosen] = 0
 
     @property
@@ -303,7 +284,7 @@ class Batch:
         """Indices below ``count`` for the masked environments, drawn unless they are given (n,)."""
         if given is not None:
             return np.broadcast_to(np.asarray(given, dtype=np.int32), (self.n,))[mask]
-        return np.floor(draws.uniform(words) * count).astype(np.int32)
+        return np.floor(uniform(words) * count).astype(np.int32)
 
     def step(self) -> None:
         """Advance by one action, which lies in ``arrays.action``; rewards, ends and observations are new."""

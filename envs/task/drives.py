@@ -14,15 +14,14 @@ from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..maneuvers import drive_seeds, get_maneuver, get_recording, recording_names
 from ..maneuvers.maneuver import LARGEST_OFFSET
-from ..platform.kernels.step import ActuatorDynamics
-from ..platform.machines import Platform
+from ..platform.machines import ActuatorDynamics, Platform
 from ..platform.presets import get_platform
 from ..platform.randomization import random_platform
 from .options import EpisodeOptions, RandomizationOptions, TaskOptions
 
 _FRICTION_STREAM: Final = 1
 _MACHINE_STREAM: Final = 2
-_BUILD_STREAM: Final = 3
+_PLATFORM_STREAM: Final = 3
 
 _DRAWS: Final = 8
 """How often a random drive is drawn anew, at most, whose car comes off its path."""
@@ -134,16 +133,16 @@ def machines_of(options: TaskOptions) -> list[Platform]:
     """The machines that episodes draw from: the platform, or variants of it, drawn.
 
     Raises:
-        ConfigurationError: no machine of the builds asked for closes.
+        ConfigurationError: none of the drawn machines closes.
     """
     platform, ranges, seed = platform_of(options), options.randomization, options.episode.library_seed
-    if ranges.natural_frequency is None and ranges.dead_time is None and ranges.build is None:
+    if ranges.natural_frequency is None and ranges.dead_time is None and ranges.platform is None:
         return [platform]
-    machines = [platform] * ranges.machines
-    if ranges.build is not None:
-        rng = np.random.default_rng((seed, _BUILD_STREAM))
-        names = [f"{platform.name}-{k}" for k in range(ranges.machines)]
-        machines = [random_platform(platform, ranges.build, rng, name) for name in names]
+    machines = [platform] * ranges.platforms
+    if ranges.platform is not None:
+        rng = np.random.default_rng((seed, _PLATFORM_STREAM))
+        names = [f"{platform.name}-{k}" for k in range(ranges.platforms)]
+        machines = [random_platform(platform, ranges.platform, rng, name) for name in names]
     rng = np.random.default_rng((seed, _MACHINE_STREAM))
     return [_variant(machine, ranges, rng) for machine in machines]
 

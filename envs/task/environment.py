@@ -1,9 +1,9 @@
-"""The spaces of an environment, and options as an environment's constructor takes them."""
+"""The Gymnasium environment: a batch with one row; and what it shares with the vector environment."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium
@@ -14,7 +14,7 @@ from gymnasium.utils import EzPickle
 from numpy.typing import ArrayLike, NDArray
 
 from ..cues import CueTrace
-from ..errors import ActionError, ConfigurationError
+from ..errors import ActionError, ConfigurationError, UnknownArgumentError, suggest
 from ..settings import from_dict
 from ..simulator.simulator import TIME_STEP
 from .batch import Batch
@@ -28,6 +28,12 @@ if TYPE_CHECKING:
 RENDER_MODES: Final = ("human", "rgb_array")
 """What ``render_mode`` may be, beside None."""
 
+ARGUMENTS: Final = ("task", "drives", "base", "render_mode", "render_size")
+"""Arguments of an environment beside the fields of :class:`~.options.TaskOptions`."""
+
+_BEFORE: Final = {"randomisation": "randomization"}
+"""Names of fields in earlier versions."""
+
 
 def observation_space(batch: Batch) -> Space[Any]:
     """Of one environment: float32, bounded by each row's bound."""
@@ -40,14 +46,44 @@ def action_space(batch: Batch) -> Space[Any]:
     return Box(-1.0, 1.0, (batch.action_size,), dtype=np.float32)
 
 
-def task_options(task: TaskOptions | None, fields: dict[str, Any]) -> TaskOptions:
+def task_options(
+    task: TaskOptions | None, fields: dict[str, Any], arguments: Iterable[str] = ()
+) -> TaskOptions:
     """``task`` (default: all defaults) with some fields replaced; nested ones may be plain dictionaries.
 
+    Args:
+        task: Where to begin.
+        fields: Fields to replace.
+        arguments: Further keywords that the caller knows, for the message.
+
     Raises:
-        ConfigurationError: a field is unknown, of the wrong type or out of range.
+        UnknownArgumentError: there is no such field.
+        ConfigurationError: a nested field is unknown, or one is of the wrong type or out of range.
     """
-    start = {} if task is None else {f.name: getattr(task, f.name) for f in dataclasses.fields(TaskOptions)}
-    return from_dict(TaskOptions, start | fields, "environment options")
+    known = [field.name for field in dataclasses.fields(TaskOptions)]
+    start = {} if task is None else {name: getattr(task, name) for name in known}
+    for name in fields:
+        if name not in (*known, *_BEFORE):
+            raise UnknownArgumentError(
+                f"got an unexpected keyword argument {name!r}. {suggest(name, [*known, *arguments])}"
+            )
+    return from_dict(
+        TaskOptions,
+        start | {_BEFORE.get(name, name): value for name, value in fields.items()},
+        "environment options",
+    )
+
+
+def drive_option(options: dict[str, Any] | None, known: Sequence[str] = ("drive",)) -> Any:
+    """The drive that ``reset(options=...)`` asks for, or None.
+
+    Raises:
+        ConfigurationError: there is an option that is none of ``known``.
+    """
+    for name in options or {}:
+        if name not in known:
+            raise ConfigurationError(f"reset: unknown option {name!r}. {suggest(str(name), known)}")
+    return (options or {}).get("drive")
 
 
 def pictures_of(batch: Batch, mode: str | None, size: tuple[int, int] | None) -> Pictures | None:
@@ -81,15 +117,39 @@ def frames_per_second(batch: Batch) -> float:
     return 1.0 / batch.time_step
 
 
-# The Gymnasium environment: a batch with one row.
-
-
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]
 
 
 class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
-    """A driving simulator that moves its driver as a car would; ``docs/environment.md`` has rows and units.
+    """A driving simulator that moves its driver as a car would, as far as its travel lets it.
+
+    **Description.** A car drives, and a motion base (carriage, hexapod, turntable) moves the cab of a driving
+    simulator. The agent commands the motion base. Its driver shall feel what the driver of the car feels:
+    specific force and angular velocity, without false cues and without an end of travel.
+
+    **Action Space.** ``Box(-1, 1)``, float32: for each of nine axes (carriage x, y; surge, sway, heave; roll,
+    pitch, yaw; turntable) its acceleration, as a share of the largest one the axis can do by itself. See
+    :class:`~.kernels.action.ActionOptions` for rates, speeds, residuals and gains instead.
+
+    **Observation Space.** ``Box``, float32, in fixed physical scaling: the car's cues, the cab's cues, the
+    set-points of the motion base, the cues' errors and the last action; and by choice a preview, a memory,
+    perceived cues, true motion and what the machine can do.
+    ``python -m motion_cueing.envs.task.observation`` prints every row.
+
+    **Rewards.** Minus the weighted sum of terms, which ``info`` has by name: above all the cue error, whose
+    mean over a drive is J. ``python -m motion_cueing.envs.task.reward`` prints every term and its weight.
+
+    **Starting State.** The motion base at rest at neutral, or anywhere within ``episode.platform_offset`` of
+    its travel. The car at the begin of a drive drawn from the library, or anywhere in it with
+    ``episode.random_start``. The seed and the number of the episode decide all draws.
+
+    **Episode End.** ``truncated`` at the end of the drive or after ``episode.duration``; ``terminated`` at an
+    end of travel or a nearly singular pose, with ``episode.terminate_on_failure`` alone.
+
+    **Arguments.** Below, and every field of :class:`~.options.TaskOptions`.
+
+    **Version History.** v0: the first.
 
     Args:
         task: Everything that can be chosen; default: all defaults.
@@ -101,6 +161,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 
     Raises:
+        UnknownArgumentError: an argument is unknown.
         ConfigurationError: an option is unknown, of the wrong type or out of range.
         RenderingUnavailableError: ``render_mode`` is given, and the extra ``render`` is not installed.
     """
@@ -123,7 +184,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         looks = {"render_mode": render_mode, "render_size": render_size}
         EzPickle.__init__(self, task, drives=drives, base=base, **looks, **fields)
         self.render_mode = render_mode
-        self.task = task_options(task, fields)
+        self.task = task_options(task, fields, ARGUMENTS)
         self.batch = Batch(1, self.task, drives=drives, base=base)
         self.observation_space = observation_space(self.batch)
         self.action_space = action_space(self.batch)
@@ -153,11 +214,11 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         Returns:
             The observation, and ``drive`` (index into ``batch.drives``) and ``time`` (s, in the drive).
         """
+        drive = drive_option(options)
         super().reset(seed=seed)
         if seed is not None or not self._seeded:
             self.batch.seed(self._all, [self.np_random_seed])
             self._seeded = True
-        drive = (options or {}).get("drive")
         self.batch.begin(self._all, None if drive is None else self.batch.drive_indices(drive))
         self.batch.observe(self._all)
         if self._pictures is not None:
@@ -193,7 +254,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         )
 
     def render(self) -> Picture | None:
-        """The machine now, beside the cues wanted and felt.
+        """The machine now, beside the reference and the simulator cues.
 
         Returns:
             In the mode "rgb_array" a frame (height, width, 3), read-only, at most 1/30 s old; else None.
@@ -206,6 +267,31 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         """Close the window, if there is one."""
         if self._pictures is not None:
             self._pictures.close()
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes, for :meth:`set_state` of an environment made alike."""
+        return {"batch": self.batch.snapshot(), "seeded": self._seeded}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from where :meth:`get_state` was called: the same actions then give the same bits.
+
+        Raises:
+            DataError: the state is of another environment or version.
+        """
+        self.batch.restore(state["batch"])
+        self._seeded = state["seeded"]
+        if self._pictures is not None and self._seeded:
+            self._pictures.begin(self._all)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickles and deep copies go on in mid-episode."""
+        generator = {"_np_random": self._np_random, "_np_random_seed": self._np_random_seed}
+        return {**EzPickle.__getstate__(self), "state": self.get_state(), "generator": generator}
+
+    def __setstate__(self, pickled: dict[str, Any]) -> None:
+        EzPickle.__setstate__(self, pickled)
+        self.__dict__.update(pickled["generator"])
+        self.set_state(pickled["state"])
 
 
 def normalized(acceleration: ArrayLike, scale: NDArray[np.float64]) -> Action:

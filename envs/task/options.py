@@ -1,8 +1,7 @@
-"""Everything that can be chosen about the environment, as frozen dataclasses that load from YAML."""
+"""Options of the environment, as frozen dataclasses that load from YAML."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
@@ -11,12 +10,13 @@ from pydantic import Field
 from ..errors import UnknownNameError
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..perception.models import vestibular_model_names
-from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, platform_names
 from ..platform.randomization import PlatformRanges
-from ..settings import NonNegative, Positive, Vector2, Vector3, configuration, renamed
-from ..simulator.kernels.step import CueCost
+from ..settings import NonNegative, Positive, Vector2, configuration, renamed
+from .kernels.action import ActionOptions
+from .kernels.observation import ObservationOptions
+from .kernels.reward import RewardOptions
 
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
@@ -36,117 +36,6 @@ def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
 def _check_range(name: str, limits: Vector2) -> None:
     if limits[0] > limits[1]:
         raise ValueError(f"{name} must be a range from low to high, found {list(limits)}")
-
-
-@configuration
-class ObservationOptions:
-    """What the observation holds beside its fixed rows.
-
-    Args:
-        preview: Samples of the car's cues ahead.
-        preview_spacing: Time between them, s; rounded to whole time steps.
-        perceived: Whether the signals the driver senses, in the car and in the simulator, are added.
-        true_motion: Whether the machine's true motion is added; it differs from the set-points where
-            actuators lag.
-        stack: Observations in one, the newest first; 1 for no stacking.
-        memory: Time constants of first-order low-passes of the car's cues, s: what a policy without a memory
-            of its own knows of the past.
-        frame: Axes of the machine's rows: "machine", or "cab": turned with the cab's heading, so that what
-            is ahead of the driver looks the same wherever the turntable stands.
-        machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
-            A policy that is told this runs on any machine.
-        simulator_cue: Source of the rows of simulator cues. "machine": true motion, by its sensors. "model":
-            those of the set-points, which a controller works out by itself. A policy that sees the second
-            has no loop through the actuators, so their lag and dead time cannot make it swing.
-    """
-
-    preview: Count = 0
-    preview_spacing: Positive = 0.2
-    perceived: bool = False
-    true_motion: bool = False
-    stack: PositiveCount = 1
-    memory: tuple[Positive, ...] = ()
-    frame: Frame = "machine"
-    machine: bool = False
-    simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
-
-
-@configuration
-class ActionOptions:
-    """What an action means; always a number in [-1, 1] for each entry.
-
-    Args:
-        mode: "acceleration": of the nine axes. "jerk": their rate of change. "velocity": the speed to
-            reach, as fast as ``authority`` lets. "residual": an acceleration added to that of the base
-            policy. "gains": the parameters of the base policy.
-        authority: Largest acceleration, as a share of what the machine can do on the axis alone.
-        largest: What that is a share of instead, m/s^2 and rad/s^2 in the order of ``AXES``: then an action
-            asks for the same of every machine, which gives as much as it can.
-        rise_time: Time in which full jerk takes an acceleration from zero to its largest value, s.
-        frozen: Axes that do not move, by name.
-        repeat: Time steps for which an action is held; rewards are averaged over them.
-        frame: Axes of carriage, displacement and tilt: "machine", or "cab": turned with the cab's heading.
-    """
-
-    mode: Mode = "acceleration"
-    authority: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    largest: Annotated[tuple[Positive, ...], Field(min_length=9, max_length=9)] | None = None
-    rise_time: Positive = 0.2
-    frozen: tuple[str, ...] = ()
-    repeat: PositiveCount = 1
-    frame: Frame = "machine"
-
-    def __post_init__(self) -> None:
-        _check_names("axis", self.frozen, AXES)
-
-
-@configuration
-class RewardWeights:
-    """Weight of each term of the reward, which is minus their weighted sum; 0 switches a term off.
-
-    Args:
-        cue_error: Error of the cues at the cab, whose mean over a drive is J.
-        perceived_error: The same of what the driver senses.
-        false_cues: The part of ``cue_error`` on axes that move where the car does not, or against it.
-        tilt_rate: Square of the roll and pitch rate beyond the car's own, above the threshold, in thresholds.
-        stroke: Square of the use of travel beyond a margin, summed over actuators; 1 at an end of travel.
-        limits: Share of the actuators held back by a limit.
-        action_rate: Mean square change of the action.
-        failure: 1 where the episode is terminated.
-    """
-
-    cue_error: NonNegative = 1.0
-    perceived_error: NonNegative = 0.0
-    false_cues: NonNegative = 0.0
-    tilt_rate: NonNegative = 0.02
-    stroke: NonNegative = 0.1
-    limits: NonNegative = 0.1
-    action_rate: NonNegative = 0.02
-    failure: NonNegative = 100.0
-
-
-@configuration
-class RewardOptions:
-    """The reward's weights, scales and thresholds.
-
-    Args:
-        weights: Of its terms.
-        zone: Indifference zone of the cue errors.
-        force_threshold: Perception of specific force x, y, z, m/s^2 (Reid and Nahon, from memory).
-        rate_threshold: Perception of angular velocity x, y, z, rad/s (Zacharias; 3.0, 3.6, 2.6 deg/s).
-        tilt_rate: Tilt rate that goes unnoticed, rad/s (3 deg/s, SIMONA).
-        stroke_margin: Share of the travel that costs nothing.
-        stroke_braking: Travel counts where an actuator would come to a stop with this share of its
-            acceleration, so that what lies beyond a short horizon costs now; None: where it is.
-    """
-
-    weights: RewardWeights = RewardWeights()
-    zone: CueCost = CueCost()
-    force_threshold: Vector3 = (0.17, 0.17, 0.28)
-    rate_threshold: Vector3 = (math.radians(3.0), math.radians(3.6), math.radians(2.6))
-    tilt_rate: Positive = math.radians(3.0)
-    stroke_margin: Share = 0.8
-    stroke_braking: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
 
 
 @configuration
@@ -189,8 +78,8 @@ class RandomizationOptions:
         friction: Range of a factor on the tires' friction, drawn for each drive of the library.
         natural_frequency: Range of the actuators' lag, rad/s; None leaves the platform's own.
         dead_time: Range of the actuators' dead time, s; None leaves the platform's own.
-        build: How the machines themselves differ; None leaves the platform as it is.
-        machines: Machines to draw from, if build, lag or dead time are drawn.
+        platform: How the platforms themselves differ; None leaves the given one as it is.
+        platforms: Platforms to draw from, if they, their lag or their dead time are drawn.
         actuator_gain: Largest relative error of the acceleration of each axis.
         sensor_gain: Largest relative error of the cab's accelerometers and gyroscopes.
         force_noise: Standard deviation of the noise of the cab's accelerometers, m/s^2.
@@ -200,8 +89,8 @@ class RandomizationOptions:
     friction: tuple[Positive, Positive] = (1.0, 1.0)
     natural_frequency: tuple[Positive, Positive] | None = None
     dead_time: tuple[NonNegative, NonNegative] | None = None
-    build: PlatformRanges | None = None
-    machines: PositiveCount = 16
+    platform: Annotated[PlatformRanges | None, renamed("platform", "build")] = None
+    platforms: Annotated[PositiveCount, renamed("platforms", "machines")] = 16
     actuator_gain: Share = 0.0
     sensor_gain: Share = 0.0
     force_noise: NonNegative = 0.0

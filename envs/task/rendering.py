@@ -83,7 +83,7 @@ class Pictures:
     def _renderer_of(self, i: int) -> Renderer:
         """Draws the machine of an environment."""
         simulator = self._batch.simulator
-        several = self._batch.options.randomization.build is not None
+        several = self._batch.options.randomization.platform is not None
         which = int(simulator.platform_of[i]) if several else 0
         if which not in self._renderers:
             self._renderers[which] = Renderer(simulator.platforms[which], self._size)
@@ -102,7 +102,7 @@ class Pictures:
 
 
 class _View:
-    """What is kept of an environment between frames: its cues, its last frame and the steps since."""
+    """An environment between frames: its cues, its last frame and the steps since."""
 
     def __init__(self, dt: float) -> None:
         self.cues = CueHistory("", _DRIVER, dt)

@@ -1,4 +1,4 @@
-"""A batch of drives over many actions, differentiable: for training by the machine's own gradients."""
+"""Differentiable unroll: a batch of drives over many actions, with gradients by the kernels' adjoints."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.kernels.step import State
 from ..simulator.simulator import Snapshot, bytes_of, put_bytes
 from .batch import Batch
+from .kernels.episode import look_with_adjoint, play_with_adjoint
 from .kernels.reward import vec_terms
-from .kernels.unroll import look_with_adjoint, play_with_adjoint
 
 _MODES: Final = ("acceleration", "jerk", "velocity")
 
@@ -27,8 +27,8 @@ class TaskUnroll:
 
     Forward: :meth:`begin` or :meth:`go_on`, then for each action k = 0, 1, ...: :meth:`observe`,
     :meth:`act`; and once more :meth:`observe` where the end counts. Backward, after :meth:`weigh`, from the
-    last to the first: :meth:`back_through_observe` with the gradient of what was seen, and
-    :meth:`back_through_act`, which tells that with respect to the action.
+    last to the first: :meth:`back_through_observe` with the gradient with respect to the observation, and
+    :meth:`back_through_act`, which returns that with respect to the action.
 
     Args:
         batch: Where episodes are drawn; its own state stays where it is.
@@ -202,7 +202,7 @@ class TaskUnroll:
         return np.asarray(self._taken[k + 1].grad.numpy())
 
     def back_through_observe(self, k: int, gradient: NDArray[np.float32]) -> None:
-        """Lead the gradient (n, size) with respect to what :meth:`observe` told at k back to the machine."""
+        """Lead the gradient (n, size) with respect to the observation k back to the machine."""
         self._seen[k].grad.assign(gradient)
         self._looks_back[k].launch()
 

@@ -15,8 +15,10 @@ from ..errors import ConfigurationError
 from ..simulator.simulator import TIME_STEP
 from .batch import Batch
 from .environment import (
+    ARGUMENTS,
     RENDER_MODES,
     action_space,
+    drive_option,
     frames_per_second,
     normalized,
     observation_space,
@@ -52,6 +54,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 
     Raises:
+        UnknownArgumentError: an argument is unknown.
         ConfigurationError: an option is unknown, of the wrong type or out of range.
         RenderingUnavailableError: ``render_mode`` is given, and the extra ``render`` is not installed.
     """
@@ -77,7 +80,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
     ) -> None:
         super().__init__()
         self.render_mode = render_mode
-        self.task = task_options(task, fields)
+        self.task = task_options(task, fields, (*ARGUMENTS, "autoreset_mode", "copy", "device"))
         self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
         self.num_envs = num_envs
         self.single_observation_space = observation_space(self.batch)
@@ -85,8 +88,8 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        told = {"render_fps": frames_per_second(self.batch), "autoreset_mode": self.autoreset_mode}
-        self.metadata = self.metadata | told
+        own = {"render_fps": frames_per_second(self.batch), "autoreset_mode": self.autoreset_mode}
+        self.metadata = self.metadata | own
         self._pictures = pictures_of(self.batch, render_mode, render_size)
         self._copy = copy
         self._ended = np.zeros(num_envs, dtype=bool)
@@ -117,10 +120,10 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         Returns:
             Observations, and ``drive`` (index into ``batch.drives``) and ``time`` (s, in the drive).
         """
+        drive = drive_option(options, ("drive", "reset_mask"))
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = self._reset_mask(options or {})
         self._seed(mask, seed)
-        drive = (options or {}).get("drive")
         self.batch.begin(mask, None if drive is None else self.batch.drive_indices(drive))
         self._observe(mask)
         self._ended[mask] = False
@@ -200,13 +203,46 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         return self._observations(), reward, terminated, truncated, info
 
     def render(self) -> tuple[Picture, ...] | None:
-        """The machines now, beside the cues wanted and felt.
+        """The machines now, beside the reference and the simulator cues.
 
         Returns:
             In the mode "rgb_array" a frame of each environment, as :meth:`DrivingSimulator.render`; else
             None. In the mode "human" steps show themselves.
         """
         return rendered(self._pictures)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """What :class:`~.environment.DrivingSimulator` has under this name, of each environment."""
+        if name == "scale":
+            return tuple(np.broadcast_to(self.scale, (self.num_envs, self.scale.shape[-1])).copy())
+        return (getattr(self, name),) * self.num_envs
+
+    def call(self, name: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:
+        """What a method of each environment returns, or its attribute, as Gymnasium's vector environments do.
+
+        Raises:
+            ConfigurationError: the method moves the environments, which only the whole batch can do.
+        """
+        if name == "render":
+            return self.render() or (None,) * self.num_envs
+        if name in ("reset", "step", "close"):
+            raise ConfigurationError(f"call: use {name}() of the vector environment")
+        return tuple(one(*arguments, **keywords) if callable(one) else one for one in self.get_attr(name))
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that changes, for :meth:`set_state` of a batch made alike."""
+        return {"batch": self.batch.snapshot(), "seeded": self._seeded, "ended": self._ended.copy()}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from where :meth:`get_state` was called: the same actions then give the same bits.
+
+        Raises:
+            DataError: the state is of another batch or version.
+        """
+        self.batch.restore(state["batch"])
+        self._seeded, self._ended = state["seeded"], state["ended"].copy()
+        if self._pictures is not None and self._seeded:
+            self._pictures.begin(np.ones(self.num_envs, dtype=bool))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""

@@ -61,7 +61,7 @@ class Endurance:
 
     def __post_init__(self) -> None:
         # The ranges are those of an environment, which says what is wrong with them.
-        assert self.randomization(SLOWER).machines == self.machines
+        assert self.randomization(SLOWER).platforms == self.machines
 
     def randomization(self, condition: str) -> RandomizationOptions:
         """What an environment draws under a condition."""
@@ -71,7 +71,7 @@ class Endurance:
             friction=self.friction,
             natural_frequency=self.natural_frequency,
             dead_time=self.dead_time,
-            machines=self.machines,
+            platforms=self.machines,
         )
 
     def machines_under(self, condition: str, platform: Platform) -> list[Platform]:

@@ -21,7 +21,7 @@ from ...envs.platform import Platform
 from ...envs.platform.kernels import ActuatorDynamics
 from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.simulator.kernels.observation import SCALES, SLICES
-from ...envs.task.observation import DIFFERENCE
+from ...envs.task.observation import ADDED
 from ..rollout import AnyPolicy, TaskPolicy, Wrapped
 from ..suite import CueSource
 from .study import Condition, moved_to, policy_on
@@ -35,7 +35,7 @@ _KINDS = (
     ("reference_force", "simulator_force", "force_error"),
     ("reference_rate", "simulator_rate", "rate_error"),
 )
-_ERRORS = {row.name: row.scale for row in DIFFERENCE}
+_ERRORS = {added.row.name: added.row.scale for added in ADDED}
 
 
 @configuration

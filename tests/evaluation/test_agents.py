@@ -15,7 +15,7 @@ from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptio
 from motion_cueing.evaluation import Trajectory, policies, rollout
 from motion_cueing.train.agents import agent as shipped
 
-from ..env.tasks import drive
+from ..envs.task.tasks import drive
 from ..train.agents import agent
 
 PAPER = get_platform("paper")

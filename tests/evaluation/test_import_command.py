@@ -14,7 +14,7 @@ from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
 from motion_cueing.envs.logs.columns import parse_columns
 
-from ..car.synthetic_log import COLUMNS, Device, drive, write
+from ..envs.logs.synthetic_log import COLUMNS, Device, drive, write
 
 TEXTS = [f"{signal}={column}" for signal, column in COLUMNS.items()]
 

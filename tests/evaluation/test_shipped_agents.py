@@ -8,7 +8,7 @@ import pytest
 from motion_cueing.baselines import ClassicalWashout
 from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.platform.kernels.step import ActuatorDynamics
+from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.evaluation import Metrics, Trajectory, measure, rollout
 from motion_cueing.evaluation.studies.disturbances import with_dynamics
 from motion_cueing.train.agents import Agent, agent_names, get_agent

@@ -24,7 +24,7 @@ from motion_cueing.envs.task.environment import normalized
 from motion_cueing.envs.task.observation import acceleration_scale, layout_of
 from motion_cueing.evaluation import Trajectory, rollout
 
-from ..env.tasks import drive
+from ..envs.task.tasks import drive
 
 SCALE = acceleration_scale(get_platform("paper"))
 
@@ -135,7 +135,7 @@ def test_a_preview_shows_what_comes():
 def test_nothing_is_random_whatever_it_was_trained_with():
     wild = TaskOptions(
         randomization=RandomizationOptions(
-            actuator_gain=0.3, sensor_gain=0.3, force_noise=1.0, dead_time=(0.0, 0.1), machines=2
+            actuator_gain=0.3, sensor_gain=0.3, force_noise=1.0, dead_time=(0.0, 0.1), platforms=2
         ),
         episode=EpisodeOptions(
             platform_offset=0.8, duration=1.0, random_start=True, terminate_on_failure=True

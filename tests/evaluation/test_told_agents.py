@@ -14,7 +14,7 @@ from motion_cueing.evaluation.rollout import on_machine
 from motion_cueing.realtime.machine import make_machine
 from motion_cueing.train.agents import agent as shipped
 
-from ..env.tasks import drive
+from ..envs.task.tasks import drive
 from ..train.agents import agent
 
 TOLD = TaskOptions(observation={"machine": True, "frame": "cab"}, action={"frame": "cab", "authority": 0.1})

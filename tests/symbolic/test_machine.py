@@ -14,7 +14,7 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import actuator_limits
 from motion_cueing.envs.simulator.simulator import Simulator
 
-from ..platform.machines_under_test import PRESETS
+from ..envs.platform.platforms_under_test import PRESETS
 from ..reference.cues import simulator_cues
 from ..reference.kinematics import clearance, legs_of
 from ..reference.machine import MachineModel

@@ -23,7 +23,7 @@ from motion_cueing.train.config import load_config, validation_task
 from motion_cueing.train.networks import Actor, begin_at_rest, standardize
 from motion_cueing.train.validation import Validation
 
-from ..env.tasks import drive
+from ..envs.task.tasks import drive
 from . import tiny
 from .agents import agent
 
@@ -31,7 +31,7 @@ BUILD = {"travel": [0.5, 1.0], "size": [0.4, 1.0], "without_carriage": 0.4, "wit
 TOLD = {
     "observation": {"preview": 0, "machine": True, "frame": "cab", "memory": [1.0]},
     "action": {"frame": "cab", "repeat": 5, "authority": 0.5},
-    "randomization": {"machines": 6, "build": BUILD},
+    "randomization": {"platforms": 6, "platform": BUILD},
 }
 
 
@@ -51,7 +51,7 @@ def test_a_spring_begins_on_machines_that_all_can_move():
 
 
 def test_what_a_machine_can_do_gets_a_standard_that_others_fit_in():
-    task = told(randomization={"machines": 2, "build": BUILD})
+    task = told(randomization={"platforms": 2, "platform": BUILD})
     batch = Batch(2, task, drives=[drive()])
     everywhere = np.ones(2, dtype=bool)
     batch.seed(everywhere, [0, 1])

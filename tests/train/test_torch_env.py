@@ -12,7 +12,7 @@ from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.train.torch_env import DrivingSimulatorTorch
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
-from ..env.tasks import SHORT, options
+from ..envs.task.tasks import SHORT, options
 
 N = 4
 DEVICES = ["cpu"] + ["cuda:0"] * torch.cuda.is_available()

@@ -17,7 +17,7 @@ from motion_cueing.train.algorithms.sb3.learner import CLASSES, arguments
 from motion_cueing.train.algorithms.sb3.policy import SkipPolicy, load_network, network_of
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
-from ..env.tasks import SHORT
+from ..envs.task.tasks import SHORT
 
 ROWS = 500
 SIZE = layout_of(ObservationOptions(), "acceleration", 9).size

@@ -17,7 +17,7 @@ from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions
 from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
-from ..env.tasks import EVERY_OPTION, SHORT, drive, options
+from ..envs.task.tasks import EVERY_OPTION, SHORT, drive, options
 
 N = 3
 

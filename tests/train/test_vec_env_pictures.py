@@ -15,7 +15,7 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.task import DrivingSimulator
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
-from ..env.tasks import SHORT, drive
+from ..envs.task.tasks import SHORT, drive
 
 SIZE = (480, 270)
 PUSH = np.full(9, 0.4, dtype=np.float32)

@@ -1,4 +1,8 @@
-"""The driver: previews the path, steers along it, and keeps the speed with the pedals."""
+"""The driver, and the kernel that drives a batch of cars through their plans (Warp).
+
+The driver previews the path, steers along it, and keeps the speed with the pedals. All time steps of a drive
+are one launch.
+"""
 
 from __future__ import annotations
 
@@ -155,7 +159,7 @@ def most_drive(car: CarParameters, speed: real) -> real:
     return wp.min(car.max_drive_force, car.max_power / wp.max(speed, real(1.0)))
 
 
-# The kernel that drives a batch of cars through their plans, all time steps in one launch (Warp).
+# All cars of a batch, all time steps in one launch.
 
 
 wp.set_module_options({"enable_backward": False})

@@ -1,4 +1,8 @@
-"""State, parameters and inputs of the vehicle model, as the kernel holds them (Warp)."""
+"""The vehicle model: single-track car with roll, pitch, tires and actuators (Warp).
+
+Equations carry the tags of docs/car.md. Velocities are those of the point B of the roll axis under the
+c.g., in the plane of the road: x forward, y right, z down.
+"""
 
 from __future__ import annotations
 
@@ -85,7 +89,7 @@ class Forces:
     slip_rate_rear: real
 
 
-# Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill (Warp).
+# Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill.
 
 
 wp.set_module_options({"enable_backward": False})
@@ -151,10 +155,7 @@ def damped_slip(slip: real, along: real, across: real, low_speed: real, damping:
     return result
 
 
-# Single-track car with roll, pitch and actuators: its parameters, state and equations of motion (Warp).
-#
-# The equations carry the tags of docs/car.md. Velocities are those of the point B of the roll axis under the
-# c.g., in the plane of the road: x forward, y right, z down.
+# Equations of motion.
 
 
 wp.set_module_options({"enable_backward": False})
@@ -341,7 +342,7 @@ def resist(car: CarParameters, deflection: real, state: State, command: Commands
     return vec2(after, limited(force, most))
 
 
-# What the cab feels: specific force and rotation, from the model's own derivatives (Warp).
+# Cues of the car: specific force and rotation at the cab, from the model's own derivatives.
 
 
 wp.set_module_options({"enable_backward": False})

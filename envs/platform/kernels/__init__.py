@@ -1,5 +1,5 @@
 """Warp functions of the motion base: kinematics, limits and actuators."""
 
-from .step import ACTUATORS, AXES, ActuatorDynamics
+from ..machines import ACTUATORS, AXES, ActuatorDynamics
 
 __all__ = ["ACTUATORS", "AXES", "ActuatorDynamics"]

@@ -1,8 +1,10 @@
-"""Euler angles, transformation matrices and angular rates: Eqs. (2) to (10).
+"""Geometry of the motion base: rotations, hexapod, points of the cab; Eqs. (2) to (15), (30) to (47).
 
-The order of rotation is roll, pitch, then yaw, beta = [phi, theta, psi]: with a turntable on top of
-the hexapod its angle simply adds to psi, Eq. (3). V_I = L_IB V_B. Every function also runs in plain
-Python, with Warp's vectors and matrices as arguments.
+The order of rotation is roll, pitch, then yaw, beta = [phi, theta, psi]: with a turntable on top of the
+hexapod its angle simply adds to psi, Eq. (3). V_I = L_IB V_B. A pose is the displacement s of the platform
+from neutral, in F_V (S = S_0 + s), and the Euler angles beta_H. The Jacobian is two 6 x 3 blocks, leg rates
+= U Sdot + W omega_HI, so that its inverse needs 3 x 3 matrices only, by normal equations. Every function
+also runs in plain Python, with Warp's vectors and matrices as arguments.
 """
 
 from __future__ import annotations
@@ -89,11 +91,7 @@ def angular_acceleration(beta: vec3, beta_rate: vec3, beta_acceleration: vec3) -
     return rate_matrix(beta) * beta_acceleration + rate_matrix_derivative(beta, beta_rate) * beta_rate
 
 
-# Hexapod kinematics: leg vectors, lengths, rates, and forward kinematics. Eqs. (11) to (13).
-#
-# A pose is the displacement s of the platform from neutral, in F_V (S = S_0 + s), and the Euler angles
-# beta_H. The Jacobian is kept as two 6 x 3 blocks: leg rates = U Sdot + W omega_HI, so that its inverse
-# needs 3 x 3 matrices only, by normal equations.
+# Hexapod: leg vectors, lengths, rates and forward kinematics, Eqs. (11) to (13).
 
 
 NEWTON_ITERATIONS = wp.constant(20)
@@ -247,7 +245,7 @@ def adjoint_forward_kinematics(
     wp.adjoint[extensions] += jacobian.u * vec3(x[0], x[1], x[2]) + jacobian.w * vec3(x[3], x[4], x[5])
 
 
-# Points fixed to the cab, which the turntable turns on the hexapod: Eqs. (14), (15), (30) to (40).
+# Points fixed to the cab on the turntable, Eqs. (14), (15), (30) to (40).
 
 
 @wp.func

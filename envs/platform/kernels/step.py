@@ -1,28 +1,37 @@
-"""Output limiting of one actuator, which brakes in time.
+"""The step of the motion base: nine accelerations in, the true motion out, all limits kept.
 
-An actuator moves with constant acceleration over a step. Its state (q, v) is safe at an upper end
+    command -> limited set-point -> dead time -> lag -> true motion
+
+**Set-point.** Each step begins where limiting left it, so a command never winds up. Carriage and turntable
+are limited axis by axis. A hexapod command is followed exactly where every leg may; else each leg goes as
+far towards it as its limits allow, and the platform goes where forward kinematics says.
+
+**Limits.** An actuator moves with constant acceleration over a step. Its state (q, v) is safe at an upper end
 q_max if it can stop before it with the acceleration limit A, in whole steps:
 
     v <= 0 and q <= q_max,   or   v^2 / (2 A) + A dt^2 / 8 <= q_max - q.
 
-The set is invariant: from every safe state a speed v' exists with |v' - v| <= A dt that leads to a
-safe state again, so position, speed and acceleration limits hold together and for ever, and no end
-of travel is met with a bump. Solving the condition of the next state for v' gives the bound of
-:func:`braking_speed`. Between the limits the actuator does exactly what it is told.
+The set is invariant: from every safe state a speed v' exists with |v' - v| <= A dt that leads to a safe
+state again. So position, speed and acceleration limits hold together and forever, and no end of travel is
+met with a bump. Solving the condition of the next state for v' gives the bound of :func:`braking_speed`.
+
+**Actuators.** A second-order lag and a dead time for each subsystem; none by default, as in the paper. The
+lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere negative:
+position, speed and acceleration of the machine are weighted means of those of the set-point, and keep every
+limit the set-point keeps. For a set-point of constant acceleration within a step the lag is discretized
+exactly.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Final
 
-import numpy as np
 import warp as wp
-from numpy.typing import NDArray
-from pydantic import Field
-from scipy.linalg import expm
 
 from ...arrays import mat65, real, vec2, vec3, vec6, vec9
-from ...settings import NonNegative, Positive, configuration
+from ..kinematics import NEARLY_SINGULAR
+from ..machines import ACTUATORS as ACTUATORS
+from ..machines import AXES as AXES
 from .geometry import (
     NEWTON_TOLERANCE,
     HexapodGeometry,
@@ -94,19 +103,13 @@ def active_limit(
     return 4
 
 
-# What the kernels know of a machine (constant) and of its motion (changing).
+# A machine (constant) and its motion (changing).
 
 
 CARRIAGE = slice(0, 2)
 LEGS = slice(2, 8)
 TURNTABLE = 8
 """Order of the nine actuators: carriage x and y, legs 1 to 6, turntable."""
-
-ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "leg_5", "leg_6", "turntable")
-"""Names of the nine actuators."""
-
-AXES = ("carriage_x", "carriage_y", "surge", "sway", "heave", "roll", "pitch", "yaw", "turntable")
-"""Names of the nine degrees of freedom an action commands, in its order."""
 
 END_OF_TRAVEL: Final = 0x111111111
 """Bits of a step's limits that say an end of travel, one for each actuator."""
@@ -155,49 +158,13 @@ class SetPoint:
 
 @wp.struct
 class Step:
-    """One step of the machine: where it came to, how it accelerated, what held it back."""
+    """One step of the machine: where it came to, and what held it back."""
 
     motion: Motion
-    acceleration: vec9  # mean over the step, in the order of AXES
     limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
 
 
-# Actuator dynamics: a second-order lag and a dead time for each subsystem. None by default, as in the paper.
-#
-# The lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere
-# negative: position, speed and acceleration of the machine are weighted means of those of the set-point,
-# and keep every limit the set-point keeps. Within a step the set-point moves with constant acceleration;
-# for that input the lag is discretized exactly.
-
-
-@configuration
-class ActuatorDynamics:
-    """Second-order lag and dead time of one subsystem.
-
-    Args:
-        natural_frequency: omega, rad/s; None for no lag (unity).
-        damping: zeta, at least 1 so that no limit is overshot.
-        dead_time: Pure delay, s; rounded to whole time steps.
-    """
-
-    natural_frequency: Positive | None = None
-    damping: Annotated[float, Field(ge=1.0)] = 1.0
-    dead_time: NonNegative = 0.0
-
-
-def lag_transition(dynamics: ActuatorDynamics, dt: float) -> NDArray[np.float64]:
-    """(2, 5) matrix from [y, ydot, u, udot, uddot] to [y, ydot] one step later, u being the set-point.
-
-    Zero where there is no lag; such a subsystem is not filtered.
-    """
-    omega = dynamics.natural_frequency
-    if omega is None:
-        return np.zeros((2, 5))
-    system = np.zeros((5, 5))
-    system[0, 1] = 1.0
-    system[1, :3] = [-(omega**2), -2.0 * dynamics.damping * omega, omega**2]
-    system[2, 3] = system[3, 4] = 1.0
-    return np.asarray(expm(system * dt)[:2])
+# Lag and dead time.
 
 
 @wp.func
@@ -234,11 +201,8 @@ def lag(
     return vec2(position, rate)
 
 
-# Singular poses, in which the legs do not hold the platform: it is kept from coming to rest near one.
+# Singular poses: the platform does not come to rest near one, where its legs do not hold it.
 
-
-NEARLY_SINGULAR = wp.constant(real(0.15))
-"""Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
 
 FAR_FROM_SINGULAR = wp.constant(real(0.75))
 """Clearance from which braking is taken not to lead to a singular pose."""
@@ -285,7 +249,7 @@ def keeps_clear(
     now = determinant(jacobian) / m.neutral_determinant
     if now >= FAR_FROM_SINGULAR:
         return True
-    least = wp.min(NEARLY_SINGULAR, clearance(m, start.displacement, start.beta))
+    least = wp.min(real(wp.static(NEARLY_SINGULAR)), clearance(m, start.displacement, start.beta))
     if now < least:
         return False
     halfway = extensions
@@ -301,13 +265,7 @@ def keeps_clear(
     return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
 
 
-# One step of the machine: nine accelerations in, the true motion out.
-#
-#     command -> limited set-point -> dead time -> lag -> true motion
-#
-# The set-point starts each step where limiting left it, so a command never winds up. Carriage and
-# turntable are limited axis by axis. A hexapod command is followed exactly where every leg may; else each
-# leg goes as far towards it as its limits allow and the platform goes where forward kinematics says.
+# The step.
 
 
 @wp.struct

@@ -1,11 +1,12 @@
-"""What a policy sees: one flat row an environment, in fixed physical scaling.
+"""The simulator's observation: one flat row an environment, in fixed physical scaling.
 
-Car cues now, cues felt, and the machine's state. The machine's rows are its set-points: what the limits act
-on and a controller steers; without actuator dynamics they are the true motion.
+Reference cues now, simulator cues, and the machine's state. The machine's rows are its set-points, on which
+the limits act and which a controller steers; without actuator dynamics they are the true motion.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,7 +14,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ...arrays import real, vec3, vec9
+from ...arrays import real, vec2, vec3, vec6, vec9
 from ...cues import GRAVITY
 from ...platform.kernels.step import Machine, Motion
 from .step import Cues, State
@@ -30,6 +31,7 @@ class Row:
         unit: SI unit.
         meaning: For people.
         bound: Greatest absolute value an environment's observation shows; what exceeds it is clipped.
+        entries: Their number in words, where options decide it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Row:
     unit: str
     meaning: str
     bound: float = 10.0
+    entries: str = ""
 
 
 ROWS: Final = (
@@ -65,16 +68,22 @@ OBSERVATION_SIZE: Final = sum(row.size for row in ROWS)
 """Entries of an observation."""
 
 
-def _slices() -> dict[str, slice]:
-    ends = np.cumsum([row.size for row in ROWS])
-    return {row.name: slice(int(e) - row.size, int(e)) for row, e in zip(ROWS, ends, strict=True)}
+def slices_of(rows: Sequence[Row]) -> dict[str, slice]:
+    """Where each of consecutive rows lies."""
+    ends = np.cumsum([row.size for row in rows])
+    return {row.name: slice(int(e) - row.size, int(e)) for row, e in zip(rows, ends, strict=True)}
 
 
-SLICES: Final = _slices()
+SLICES: Final = slices_of(ROWS)
 """Where each row lies in an observation."""
 
 SCALES: Final = {row.name: row.scale for row in ROWS}
 """What one unit of each row stands for, in its SI unit."""
+
+
+FIRST: Final = {name: where.start for name, where in SLICES.items()}
+UNIT: Final = {name: real(scale) for name, scale in SCALES.items()}
+"""Begin and scale of each row, for kernels."""
 
 
 def read(observation: NDArray[Any], name: str) -> NDArray[np.float64]:
@@ -84,10 +93,10 @@ def read(observation: NDArray[Any], name: str) -> NDArray[np.float64]:
 
 @wp.func
 def put(out: wp.array2d(dtype=real), i: int, first: int, value: Any, size: int, scale: real) -> int:
-    """Write ``size`` entries from ``first`` on; returns where the next row begins."""
+    """Write the ``size`` entries of a row that begins at ``first``."""
     for k in range(size):
         out[i, first + k] = value[k] / scale
-    return first + size
+    return 0
 
 
 @wp.func
@@ -108,34 +117,40 @@ def write_observation(
     out: wp.array2d(dtype=real),
     i: int,
 ) -> int:
-    """One environment's observation, the rows in the order of :data:`ROWS`; returns its size.
+    """One environment's observation: each row at its place in :data:`ROWS`.
 
-    ``p`` are the machine's set-points and ``acceleration`` its acceleration, in the frame to be seen in;
+    ``p`` are the machine's set-points and ``acceleration`` its acceleration, in the observation's frame;
     ``cues`` are those of the cab.
     """
     gravity = vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
-    one = real(1.0)
     reference = s.reference_cue.force + gravity
     simulated = cues.force + gravity
-    k = put(out, i, 0, reference, 3, real(wp.static(SCALES["reference_force"])))
-    k = put(out, i, k, s.reference_cue.rate, 3, one)
-    k = put(out, i, k, simulated, 3, real(wp.static(SCALES["simulator_force"])))
-    k = put(out, i, k, cues.rate, 3, one)
-    k = put(out, i, k, p.position, 2, real(wp.static(SCALES["carriage"])))
-    k = put(out, i, k, p.rate, 2, real(wp.static(SCALES["carriage_rate"])))
-    k = put(out, i, k, p.displacement, 3, one)
-    k = put(out, i, k, p.velocity, 3, one)
-    k = put(out, i, k, p.beta, 3, one)
-    k = put(out, i, k, p.beta_rate, 3, one)
-    out[i, k] = wp.sin(p.position[8])
-    out[i, k + 1] = wp.cos(p.position[8])
-    out[i, k + 2] = p.rate[8]
-    k = k + 3
+    legs = vec6()
+    leg_rates = vec6()
     for leg in range(6):
         j = leg + 2
-        out[i, k + leg] = share_of_limit(p.position[j], m.position_min[j], m.position_max[j])
-        out[i, k + 6 + leg] = p.rate[j] / m.velocity[j]
-    return put(out, i, k + 12, acceleration, 9, real(wp.static(SCALES["acceleration"])))
+        legs[leg] = share_of_limit(p.position[j], m.position_min[j], m.position_max[j])
+        leg_rates[leg] = p.rate[j] / m.velocity[j]
+    turntable = vec2(wp.sin(p.position[8]), wp.cos(p.position[8]))
+    turntable_rate = vec2(p.rate[8], real(0.0))
+    put(out, i, wp.static(FIRST["reference_force"]), reference, 3, wp.static(UNIT["reference_force"]))
+    put(
+        out, i, wp.static(FIRST["reference_rate"]), s.reference_cue.rate, 3, wp.static(UNIT["reference_rate"])
+    )
+    put(out, i, wp.static(FIRST["simulator_force"]), simulated, 3, wp.static(UNIT["simulator_force"]))
+    put(out, i, wp.static(FIRST["simulator_rate"]), cues.rate, 3, wp.static(UNIT["simulator_rate"]))
+    put(out, i, wp.static(FIRST["carriage"]), p.position, 2, wp.static(UNIT["carriage"]))
+    put(out, i, wp.static(FIRST["carriage_rate"]), p.rate, 2, wp.static(UNIT["carriage_rate"]))
+    put(out, i, wp.static(FIRST["displacement"]), p.displacement, 3, wp.static(UNIT["displacement"]))
+    put(out, i, wp.static(FIRST["velocity"]), p.velocity, 3, wp.static(UNIT["velocity"]))
+    put(out, i, wp.static(FIRST["beta"]), p.beta, 3, wp.static(UNIT["beta"]))
+    put(out, i, wp.static(FIRST["beta_rate"]), p.beta_rate, 3, wp.static(UNIT["beta_rate"]))
+    put(out, i, wp.static(FIRST["turntable"]), turntable, 2, wp.static(UNIT["turntable"]))
+    put(out, i, wp.static(FIRST["turntable_rate"]), turntable_rate, 1, wp.static(UNIT["turntable_rate"]))
+    put(out, i, wp.static(FIRST["legs"]), legs, 6, wp.static(UNIT["legs"]))
+    put(out, i, wp.static(FIRST["leg_rates"]), leg_rates, 6, wp.static(UNIT["leg_rates"]))
+    put(out, i, wp.static(FIRST["acceleration"]), acceleration, 9, wp.static(UNIT["acceleration"]))
+    return 0
 
 
 def observe_kernel(

@@ -1,4 +1,7 @@
-"""The state of one environment: what a batch holds a row of for each environment."""
+"""The simulator's step: state of an environment, cue cost, motion base, cues and perception.
+
+car cue -> policy -> **motion base -> simulator cues -> perceived cues**
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ class Cues:
 class State:
     """Everything that changes in one environment."""
 
-    sample: int  # index of the car's cue that is wanted now
+    sample: int  # index of the reference cue now
     setpoint: Motion  # limited commands
     motion: Motion  # the true machine: the set-point after dead time and lag
     acceleration: vec9  # of the true machine over the last step, in the order of AXES
@@ -52,7 +55,7 @@ class Drives:
     length: wp.array(dtype=int)
 
 
-# The headline cost of a moment: how far what is felt lies from what is wanted, in indifference zones.
+# Cue cost: squared errors in units of the indifference zone.
 
 
 @configuration
@@ -111,9 +114,7 @@ def perceived_error(z: Zone, s: State) -> real:
     )
 
 
-# The step of one environment: machine, cues and perception. One definition serves every kernel.
-#
-# car cue -> policy -> **machine -> cues felt -> sensed**
+# The step. One definition serves every kernel.
 
 
 @wp.func

@@ -1,6 +1,9 @@
-"""The kernels of a batch: play a step, begin an episode, look. Everything is one launch, for all rows.
+"""The kernels of a batch: play a time step, look (observe), and forget the actions of an ended episode.
 
-action -> accelerations -> **machine, cues, perception** -> reward -> observation
+action -> accelerations -> **motion base, cues, perception** -> reward -> observation
+
+Each is one launch for all environments. The second pair has adjoints and works out of place; compiling it
+takes about a minute, once a machine.
 """
 
 from __future__ import annotations
@@ -13,8 +16,8 @@ from ...platform.kernels.step import Machine, SetPoint
 from ...simulator.kernels.observation import write_observation
 from ...simulator.kernels.step import Drives, State, next_state, shift_delay
 from .action import ActionScale, applied_accelerations, own_accelerations, take_action
-from .observation import Episode, Places, repeat_frame, shift_frames, write_frame
-from .reward import RewardScale, action_change, has_failed, terms_now, vec_terms
+from .observation import Episode, View, repeat_frame, shift_frames, write_frame
+from .reward import Reward, action_terms, end_terms, state_terms, vec_terms
 
 CORE = wp.constant(1)
 FRAME = wp.constant(2)
@@ -26,8 +29,8 @@ class Rules:
     """What is the same for the whole batch."""
 
     action: ActionScale
-    reward: RewardScale
-    places: Places
+    reward: Reward
+    view: View
     share: real  # of a time step in an action
     dt: real  # time step, s
 
@@ -78,16 +81,17 @@ def commanded(rules: Rules, a: Arrays, which: int, s: State, i: int, first: int)
 @wp.func
 def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> int:
     """Terms, reward and ends after a time step; terms are means over the time steps of an action."""
-    terms = terms_now(rules.reward, m, s, rules.share)
+    terms = state_terms(rules.reward.scale, m, s, rules.share)
     ended = bool(False)
     if first != 0:
-        terms[6] = action_change(a.now, a.before, i)
+        terms = terms + action_terms(a.now, a.before, i)
     else:
         terms = terms + a.terms[i]
         ended = a.terminated[i]
-    if rules.reward.terminate != 0 and not ended and has_failed(s.limits):
-        terms[7] = real(1.0)
-        ended = bool(True)
+    if rules.reward.terminate != 0 and not ended:
+        ends = end_terms(s.limits)
+        terms = terms + ends
+        ended = wp.max(ends) > real(0.0)
     a.terms[i] = terms
     a.reward[i] = -wp.dot(rules.reward.weights, terms)
     a.terminated[i] = ended
@@ -112,9 +116,9 @@ def look_at(
         write_observation(m, s, s.setpoint, s.acceleration, s.simulator_cue, a.core, i)
     if parts & FRAME:
         command = a.command[i]
-        shift_frames(a.observation, i, rules.places.frame)
+        shift_frames(a.observation, i, rules.view.frame)
         write_frame(
-            rules.places,
+            rules.view,
             drives,
             drive,
             a.episode[i],
@@ -183,7 +187,7 @@ def look(
     which = machine_of[i]
     look_at(rules, a, drives, drive_of[i], which, machines[which], state[i], i, parts)
     if begins and parts & FRAME:
-        repeat_frame(a.observation, i, rules.places.frame)
+        repeat_frame(a.observation, i, rules.view.frame)
 
 
 @wp.kernel(enable_backward=False, module="unique")
@@ -196,3 +200,85 @@ def forget(a: Arrays) -> None:
         a.now[i, k] = wp.float32(0.0)
         a.before[i, k] = wp.float32(0.0)
     a.command[i] = Command()
+
+
+# With adjoints.
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def play_with_adjoint(
+    rules: Rules,
+    episodes: wp.array(dtype=Episode),
+    machines: wp.array(dtype=Machine),
+    vestibular: wp.array(dtype=Vestibular),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    first: int,
+    now: wp.array2d(dtype=wp.float32),
+    before: wp.array2d(dtype=wp.float32),
+    own: wp.array(dtype=vec9),
+    state: wp.array(dtype=State),
+    delay: wp.array2d(dtype=SetPoint),
+    own_out: wp.array(dtype=vec9),
+    state_out: wp.array(dtype=State),
+    delay_out: wp.array2d(dtype=SetPoint),
+    terms: wp.array(dtype=vec_terms),
+    cost: wp.array(dtype=real),
+) -> None:
+    """One time step; adds its terms, and minus its reward to the cost. ``now`` lies within [-1, 1]."""
+    i = wp.tid()
+    which = machine_of[i]
+    m = machines[which]
+    s = state[i]
+    asked = own_accelerations(rules.action, which, s.setpoint, now, i, own[i], rules.dt)
+    own_out[i] = asked
+    wanted = wp.cw_mul(
+        applied_accelerations(rules.action, s.setpoint, asked, vec9()), episodes[i].actuator_gain
+    )
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, wanted, rules.dt)
+    if m.has_dynamics != 0:
+        shift_delay(delay, delay_out, i, after.setpoint)
+    state_out[i] = after
+    found = state_terms(rules.reward.scale, m, after, rules.share)
+    wp.atomic_add(terms, i, found)
+    if first != 0:
+        found = found + action_terms(now, before, i)
+    wp.atomic_add(cost, i, wp.dot(rules.reward.weights, found))
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def look_with_adjoint(
+    rules: Rules,
+    episodes: wp.array(dtype=Episode),
+    machines: wp.array(dtype=Machine),
+    drives: Drives,
+    machine_of: wp.array(dtype=int),
+    drive_of: wp.array(dtype=int),
+    memory: wp.array2d(dtype=wp.float32),
+    bounds: wp.array(dtype=wp.float32),
+    now: wp.array2d(dtype=wp.float32),
+    own: wp.array(dtype=vec9),
+    state: wp.array(dtype=State),
+    fixed: wp.array2d(dtype=real),
+    out: wp.array2d(dtype=wp.float32),
+) -> None:
+    """Observations before an action; ``now`` is the last one."""
+    i = wp.tid()
+    write_frame(
+        rules.view,
+        drives,
+        drive_of[i],
+        episodes[i],
+        machine_of[i],
+        machines[machine_of[i]],
+        state[i],
+        fixed,
+        now,
+        own[i],
+        vec9(),
+        memory,
+        bounds,
+        out,
+        i,
+    )

@@ -1,128 +1,348 @@
-"""Entries of an observation: float32, each clipped to its bound."""
+"""Observations: which rows an environment shows, where they lie, and how a kernel writes them.
+
+A row is declared once, in :data:`ADDED` (those of every policy in the simulator's ``ROWS``): name, entries,
+scale, unit, meaning, bound, and when it is there. Layout, places in the kernel, scales and the table in the
+documentation follow from that. :func:`write_frame` writes it, by its name. Entries are float32 in fixed
+physical scaling, each clipped to its bound.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
+from pydantic import Field
+from scipy.signal import lfilter
 
 from ...arrays import real, vec2, vec3, vec9
-from ...cues import GRAVITY
+from ...cues import GRAVITY, CueTrace
 from ...platform.kernels.step import Machine, Motion
-from ...platform.machines import Platform
-from ...platform.parameters import UNLIMITED
-from ...simulator.kernels.observation import SCALES, SLICES, share_of_limit, write_observation
+from ...platform.kinematics import axis_reach
+from ...platform.machines import Platform, Turntable
+from ...settings import Positive, configuration, renamed
+from ...simulator.kernels.observation import (
+    FIRST,
+    ROWS,
+    SCALES,
+    Row,
+    share_of_limit,
+    slices_of,
+    write_observation,
+)
 from ...simulator.kernels.step import Cues, Drives, State, simulator_cues
-from .. import draws
-from ..observation import MACHINE, Layout
-from ..options import EpisodeOptions, ObservationOptions, RandomizationOptions
-
-
-@wp.func
-def put_entry(
-    out: wp.array2d(dtype=wp.float32), i: int, k: int, value: real, bounds: wp.array(dtype=wp.float32)
-) -> int:
-    """Write an entry, clipped to its bound."""
-    # Once only: an entry that is written twice would count twice in the adjoint.
-    out[i, k] = wp.clamp(wp.float32(value), -bounds[k], bounds[k])
-    return k + 1
-
-
-@wp.func
-def put_vector(
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
-    first: int,
-    value: Any,
-    size: int,
-    scale: real,
-    bounds: wp.array(dtype=wp.float32),
-) -> int:
-    """Write ``size`` entries from ``first`` on; returns where the next row begins."""
-    for k in range(size):
-        put_entry(out, i, first + k, value[k] / scale, bounds)
-    return first + size
-
-
-# The cab's heading: rows and actions in axes that turn with the driver.
-#
-# Carriage and displacement turn by the heading psi_T + psi_H, the hexapod's tilt by psi_T: roll and pitch are
-# about axes that its own yaw turns already.
-
-
-@wp.func
-def turned(x: real, y: real, angle: real) -> vec2:
-    """A horizontal vector in axes that are turned by ``angle``."""
-    c = wp.cos(angle)
-    s = wp.sin(angle)
-    return vec2(c * x + s * y, c * y - s * x)
-
-
-@wp.func
-def heading(m: Motion) -> real:
-    """psi_T + psi_H."""
-    return m.position[8] + m.beta[2]
-
-
-@wp.func
-def turned_axes(v: vec9, psi: real, psi_t: real) -> vec9:
-    """Nine values in the order of ``AXES``, carriage and displacement turned by psi, tilt by psi_T."""
-    carriage = turned(v[0], v[1], psi)
-    surge = turned(v[2], v[3], psi)
-    tilt = turned(v[5], v[6], psi_t)
-    return vec9(carriage[0], carriage[1], surge[0], surge[1], v[4], tilt[0], tilt[1], v[7], v[8])
-
-
-@wp.func
-def to_cab(m: Motion, v: vec9) -> vec9:
-    """Values of the axes in the cab's frame."""
-    return turned_axes(v, heading(m), m.position[8])
-
-
-@wp.func
-def to_machine(m: Motion, v: vec9) -> vec9:
-    """Values of the axes in the machine's frame, from the cab's."""
-    return turned_axes(v, -heading(m), -m.position[8])
-
-
-@wp.func
-def motion_in_cab(m: Motion) -> Motion:
-    """A motion whose carriage, displacement and tilt are given in the cab's frame."""
-    psi = heading(m)
-    psi_t = m.position[8]
-    p = m.position
-    r = m.rate
-    c = turned(p[0], p[1], psi)
-    c_rate = turned(r[0], r[1], psi)
-    s = turned(m.displacement[0], m.displacement[1], psi)
-    v = turned(m.velocity[0], m.velocity[1], psi)
-    b = turned(m.beta[0], m.beta[1], psi_t)
-    b_rate = turned(m.beta_rate[0], m.beta_rate[1], psi_t)
-    out = Motion()
-    out.position = vec9(c[0], c[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
-    out.rate = vec9(c_rate[0], c_rate[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8])
-    out.displacement = vec3(s[0], s[1], m.displacement[2])
-    out.velocity = vec3(v[0], v[1], m.velocity[2])
-    out.beta = vec3(b[0], b[1], m.beta[2])
-    out.beta_rate = vec3(b_rate[0], b_rate[1], m.beta_rate[2])
-    return out
-
-
-# What is drawn for one episode.
-
+from .action import Frame, Mode, acceleration_scale, heading, motion_in_cab, to_cab, turned, velocity_scale
 
 Floats = NDArray[np.float64]
+SimulatorCueSource = Literal["machine", "model"]
 
-N_DRAWS: Final = 32
-"""Random words an episode takes: drive, machine, start, noise, two sensor gains, nine of the start pose,
-nine actuator gains, and room for more, so that adding one leaves the others as they were."""
 
-DRIVE, MACHINE_STREAM, START, NOISE = range(4)
-SENSOR_GAINS: Final = slice(4, 6)
-POSE: Final = slice(6, 15)
-ACTUATOR_GAINS: Final = slice(15, 24)
+@configuration
+class ObservationOptions:
+    """What the observation holds beside its fixed rows.
+
+    Args:
+        preview: Samples of the car's cues ahead.
+        preview_spacing: Time between them, s; rounded to whole time steps.
+        perceived: Whether the signals the driver senses, in the car and in the simulator, are added.
+        true_motion: Whether the machine's true motion is added; it differs from the set-points where
+            actuators lag.
+        stack: Observations in one, the newest first; 1 for no stacking.
+        memory: Time constants of first-order low-passes of the car's cues, s: what a policy without a memory
+            of its own knows of the past.
+        frame: Axes of the machine's rows: "machine", or "cab": turned with the cab's heading, so that what
+            is ahead of the driver looks the same wherever the turntable stands.
+        machine: Whether what the machine can do is added: how far, how fast and how suddenly each axis moves.
+            A policy that sees this runs on any machine.
+        simulator_cue: Source of the rows of simulator cues. "machine": true motion, by its sensors. "model":
+            those of the set-points, which a controller works out by itself. A policy that sees the second
+            has no loop through the actuators, so their lag and dead time cannot make it swing.
+    """
+
+    preview: Annotated[int, Field(ge=0)] = 0
+    preview_spacing: Positive = 0.2
+    perceived: bool = False
+    true_motion: bool = False
+    stack: Annotated[int, Field(ge=1)] = 1
+    memory: tuple[Positive, ...] = ()
+    frame: Frame = "machine"
+    machine: bool = False
+    simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
+
+
+@dataclass(frozen=True)
+class Added:
+    """A row that follows those of the simulator's observation.
+
+    Args:
+        row: What it is; its size is that of one repetition.
+        times: Repetitions, 0 where it is not there; for options, mode and entries of an action.
+    """
+
+    row: Row
+    times: Callable[[ObservationOptions, Mode, int], int]
+
+
+def _added(times: Callable[[ObservationOptions, Mode, int], int], *rows: Row) -> tuple[Added, ...]:
+    return tuple(Added(row, times) for row in rows)
+
+
+MACHINE: Final = (
+    Row(
+        "carriage_travel", 4, 10.0, "m", "`observation.machine`: how far carriage x goes down and up, then y"
+    ),
+    Row("carriage_top_speed", 1, 5.0, "m/s", "its largest speed"),
+    Row("carriage_top_acceleration", 1, 10.0, "m/s^2", "its largest acceleration"),
+    Row(
+        "displacement_reach",
+        6,
+        1.0,
+        "m",
+        "how far surge, sway and heave go from neutral by themselves, each down and up",
+    ),
+    Row("beta_reach", 6, 1.0, "rad", "the same of roll, pitch and yaw"),
+    Row("hexapod_top_speed", 6, 1.0, "m/s, rad/s", "largest speed of surge to yaw by themselves at neutral"),
+    Row("hexapod_top_acceleration", 6, 10.0, "m/s^2, rad/s^2", "their largest accelerations, likewise"),
+    Row("turntable_kind", 2, 1.0, "1", "1 for a turntable, 1 for one without ends", 1.0),
+    Row(
+        "turntable_travel",
+        2,
+        5.0,
+        "rad",
+        "how far it turns down and up; one turn where it has no ends, and at most",
+    ),
+    Row("turntable_top_speed", 1, 1.0, "rad/s", "its largest speed"),
+    Row("turntable_top_acceleration", 1, 1.0, "rad/s^2", "its largest acceleration"),
+)
+"""Rows of ``machine`` that do not change; 0 for what the machine does not have. See :func:`abilities`."""
+
+ADDED: Final = (
+    *_added(
+        lambda seen, mode, action: 1,
+        Row("force_error", 3, 10.0, "m/s^2", "car's specific force minus the cab's"),
+        Row("rate_error", 3, 1.0, "rad/s", "car's angular velocity minus the cab's"),
+    ),
+    *_added(
+        lambda seen, mode, action: action,
+        Row(
+            "last_action", 1, 1.0, "1", "the last action, clipped; as many entries as an action has", 1.0, "9"
+        ),
+    ),
+    *_added(
+        lambda seen, mode, action: mode == "jerk",
+        Row("command", 9, 10.0, "m/s^2, rad/s^2", '`action.mode` "jerk": accelerations last asked for'),
+    ),
+    *_added(
+        lambda seen, mode, action: mode == "residual",
+        Row(
+            "base_action",
+            9,
+            10.0,
+            "m/s^2, rad/s^2",
+            '`action.mode` "residual": accelerations the base policy asks for now',
+        ),
+    ),
+    *_added(
+        lambda seen, mode, action: seen.preview,
+        Row(
+            "preview",
+            6,
+            1.0,
+            "10 m/s^2, rad/s",
+            "`observation.preview`: car's cues ahead, nearest first, as `reference_force` and "
+            "`reference_rate`; the last cue after the end",
+            entries="6 each",
+        ),
+    ),
+    *_added(
+        lambda seen, mode, action: len(seen.memory),
+        Row(
+            "memory",
+            6,
+            1.0,
+            "10 m/s^2, rad/s",
+            "`observation.memory`: car's cues through 1/(Ts + 1), for each time constant T, in the order of "
+            "`preview`",
+            entries="6 each",
+        ),
+    ),
+    *_added(
+        lambda seen, mode, action: seen.perceived,
+        Row(
+            "perceived_reference_force",
+            3,
+            10.0,
+            "m/s^2",
+            "`observation.perceived`: specific force sensed in the car",
+        ),
+        Row("perceived_reference_rate", 3, 1.0, "rad/s", "angular velocity sensed in the car"),
+        Row("perceived_simulator_force", 3, 10.0, "m/s^2", "specific force sensed in the cab"),
+        Row("perceived_simulator_rate", 3, 1.0, "rad/s", "angular velocity sensed in the cab"),
+    ),
+    *_added(
+        lambda seen, mode, action: seen.true_motion,
+        Row(
+            "true_carriage", 2, 10.0, "m", "`observation.true_motion`: carriage x, y after lag and dead time"
+        ),
+        Row("true_carriage_rate", 2, 5.0, "m/s", "their rates"),
+        Row("true_displacement", 3, 1.0, "m", "hexapod x, y, z"),
+        Row("true_velocity", 3, 1.0, "m/s", "their rates"),
+        Row("true_beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw"),
+        Row("true_beta_rate", 3, 1.0, "rad/s", "their rates"),
+        Row("true_turntable", 2, 1.0, "1", "sine and cosine of the turntable's angle", 1.0),
+        Row("true_turntable_rate", 1, 1.0, "rad/s", "turntable rate"),
+    ),
+    *_added(
+        lambda seen, mode, action: seen.machine,
+        *MACHINE,
+        Row("travel_used", 3, 1.0, "1", "carriage x, y and turntable over the end ahead of them"),
+    ),
+)
+"""The rows after :data:`~motion_cueing.envs.simulator.kernels.observation.ROWS`, in order."""
+
+UNIT: Final = {row.name: real(row.scale) for row in (*ROWS, *(added.row for added in ADDED))}
+"""Scale of each row, for kernels."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where everything lies in an observation.
+
+    Args:
+        rows: Of one frame, in order.
+        stack: Frames, the newest first.
+    """
+
+    rows: tuple[Row, ...]
+    stack: int
+
+    @cached_property
+    def frame(self) -> int:
+        """Entries of one frame."""
+        return sum(row.size for row in self.rows)
+
+    @property
+    def size(self) -> int:
+        """Entries of an observation."""
+        return self.frame * self.stack
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each row lies in the newest frame."""
+        return slices_of(self.rows)
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float32]:
+        """(size,) greatest absolute value of each entry."""
+        frame = np.repeat([row.bound for row in self.rows], [row.size for row in self.rows])
+        return np.tile(frame, self.stack).astype(np.float32)
+
+    def first(self, name: str) -> int:
+        """Where a row begins, or -1 if it is not there."""
+        return self.slices[name].start if name in self.slices else -1
+
+
+def layout_of(options: ObservationOptions, mode: Mode, action_size: int) -> Layout:
+    """The layout that options ask for."""
+    rows = list(ROWS)
+    for added in ADDED:
+        times = int(added.times(options, mode, action_size))
+        if times:
+            rows.append(replace(added.row, size=times * added.row.size))
+    return Layout(tuple(rows), options.stack)
+
+
+SIMULATOR_FORCE, SIMULATOR_RATE = wp.constant(FIRST["simulator_force"]), wp.constant(FIRST["simulator_rate"])
+REFERENCE_FORCE, REFERENCE_RATE = wp.constant(FIRST["reference_force"]), wp.constant(FIRST["reference_rate"])
+
+
+def observation_table() -> str:
+    """Every row an observation can have, as a table in Markdown."""
+    lines = ["| Row | Entries | Unit | Scale | Bound | Meaning |", "|---|---|---|---|---|---|"]
+    for row in (*ROWS, *(added.row for added in ADDED)):
+        entries = row.entries or str(row.size)
+        lines.append(
+            f"| `{row.name}` | {entries} | {row.unit} | {row.scale:g} | {row.bound:g} | {row.meaning} |"
+        )
+    return "\n".join(lines)
+
+
+# Memory: the car's cues through first-order low-passes.
+
+
+def low_passed(drives: Sequence[CueTrace], time_constants: Sequence[float], dt: float) -> NDArray[np.float32]:
+    """(samples of all drives, 6 per time constant) cues through 1 / (T s + 1), scaled as the observation's.
+
+    Held inputs, discretized exactly: y[k] = p y[k-1] + (1 - p) u[k] with p = exp(-dt / T). Before a drive the
+    car is taken to have moved as at its first sample.
+    """
+    return np.concatenate([_of_drive(drive, time_constants, dt) for drive in drives]).astype(np.float32)
+
+
+def _of_drive(drive: CueTrace, time_constants: Sequence[float], dt: float) -> NDArray[np.float64]:
+    lifted = drive.specific_force + np.array([0.0, 0.0, GRAVITY])
+    cues = np.hstack([lifted / SCALES["reference_force"], drive.angular_velocity / SCALES["reference_rate"]])
+    columns = [np.zeros((len(cues), 0))]
+    for time_constant in time_constants:
+        p = np.exp(-dt / time_constant)
+        filtered, _ = lfilter([1.0 - p], [1.0, -p], cues, axis=0, zi=p * cues[:1])
+        columns.append(filtered)
+    return np.hstack(columns)
+
+
+# Abilities of a machine.
+
+
+_TURN: Final = 2.0 * np.pi
+"""Travel of a turntable that is shown at most, rad: beyond a turn it hardly matters."""
+
+_HEXAPOD: Final = slice(2, 8)
+"""Of the nine axes."""
+
+
+def ability_of(platform: Platform) -> NDArray[np.float32]:
+    """Entries of the rows :data:`MACHINE`, in their scales."""
+    known = abilities(platform)
+    values = [known[row.name] / row.scale for row in MACHINE]
+    return np.concatenate(values).astype(np.float32)
+
+
+def abilities(platform: Platform) -> dict[str, Floats]:
+    """The rows :data:`MACHINE` by name, in SI units: distances, speeds, accelerations.
+
+    The axes of the hexapod by themselves: how far from neutral, how fast and how suddenly at neutral, as an
+    action of 1. What a machine does not have is 0.
+    """
+    speed, acceleration = velocity_scale(platform), acceleration_scale(platform)
+    reach, carriage = axis_reach(platform.hexapod), platform.carriage
+    travel = np.zeros(4) if carriage is None else np.abs([*carriage.travel_x, *carriage.travel_y])
+    kind, turns = _turntable(platform.turntable)
+    return {
+        "carriage_travel": travel,
+        "carriage_top_speed": speed[:1],
+        "carriage_top_acceleration": acceleration[:1],
+        "displacement_reach": reach[:3].ravel(),
+        "beta_reach": reach[3:].ravel(),
+        "hexapod_top_speed": speed[_HEXAPOD],
+        "hexapod_top_acceleration": acceleration[_HEXAPOD],
+        "turntable_kind": kind,
+        "turntable_travel": turns,
+        "turntable_top_speed": speed[8:],
+        "turntable_top_acceleration": acceleration[8:],
+    }
+
+
+def _turntable(turntable: Turntable | None) -> tuple[Floats, Floats]:
+    """Whether there is one, and whether it is without ends; its travel down and up."""
+    if turntable is None:
+        return np.zeros(2), np.zeros(2)
+    if turntable.travel is None:
+        return np.ones(2), np.full(2, _TURN)
+    return np.array([1.0, 0.0]), np.minimum(np.abs(turntable.travel), _TURN)
 
 
 @wp.struct
@@ -136,136 +356,21 @@ class Episode:
     actuator_gain: vec9
 
 
-def draw(keys: NDArray[np.uint64], episodes: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """(n, N_DRAWS) words of the episodes (n,) of environments with keys (n,)."""
-    return draws.words(keys, episodes, N_DRAWS)
+# The rows in a kernel.
 
 
-def start_samples(
-    words: NDArray[np.uint64], lengths: NDArray[np.integer], options: EpisodeOptions, dt: float
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First and last sample of episodes in drives of ``lengths`` (n,) samples."""
-    ends = lengths - 1
-    steps = ends if options.duration is None else np.minimum(ends, round(options.duration / dt))
-    first = np.zeros_like(ends)
-    if options.random_start:
-        first = np.floor(draws.uniform(words[:, START]) * (ends - steps + 1)).astype(ends.dtype)
-    return first.astype(np.int32), (first + steps).astype(np.int32)
-
-
-def start_poses(words: NDArray[np.uint64], scale: Floats, share: float) -> Floats:
-    """(n, 9) poses within a share of each machine's :func:`pose_scale` (n, 9), in the order of ``AXES``."""
-    signed = share * (2.0 * draws.uniform(words[:, POSE]) - 1.0)
-    return np.asarray(signed * scale)
-
-
-def pose_scale(platform: Platform) -> Floats:
-    """(9,) largest absolute values of start poses, m and rad, in the order of ``AXES``.
-
-    Half of the legs' share goes to displacement, half to tilt: a displacement s changes no leg by more
-    than |s|, and angles change none by more than their sum times the largest distance of a joint.
-    """
-    carriage, hexapod, turntable = platform.carriage, platform.hexapod, platform.turntable
-    scale = np.zeros(9)
-    if carriage is not None:
-        scale[0] = np.min(np.abs(carriage.travel_x))
-        scale[1] = np.min(np.abs(carriage.travel_y))
-    half = 0.5 * np.min(np.abs(hexapod.extension))
-    radius = np.linalg.norm(hexapod.upper_joints, axis=1).max()
-    scale[2:5] = half / np.sqrt(3.0)
-    scale[5:8] = half / (3.0 * radius)
-    if turntable is not None:
-        travel = turntable.travel or (-UNLIMITED, UNLIMITED)
-        scale[8] = min(np.pi, *np.abs(travel))
-    return scale
-
-
-def fill_episodes(
-    view: NDArray[np.void],
-    mask: NDArray[np.bool_],
-    words: NDArray[np.uint64],
-    last: NDArray[np.int32],
-    options: RandomizationOptions,
-) -> None:
-    """Write the constants of the masked environments' episodes; ``words`` and ``last`` are theirs alone."""
-    signed = 2.0 * draws.uniform(words) - 1.0
-    gains = 1.0 + options.sensor_gain * signed[:, SENSOR_GAINS]
-    view["last"][mask] = last
-    view["noise"][mask] = (words[:, NOISE] >> np.uint64(33)).astype(np.int32)
-    view["force_gain"][mask], view["rate_gain"][mask] = gains.T
-    view["actuator_gain"][mask] = 1.0 + options.actuator_gain * signed[:, ACTUATOR_GAINS]
-
-
-# The rows that tell a policy its machine: what it can do, and how much of its travel is used.
-
-
-@wp.func
-def put_abilities(
-    abilities: wp.array2d(dtype=wp.float32),
-    which: int,
-    first: int,
-    bounds: wp.array(dtype=wp.float32),
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
-) -> int:
-    """Write what a machine can do, constants of the batch; returns where the next row begins."""
-    for k in range(abilities.shape[1]):
-        put_entry(out, i, first + k, real(abilities[which, k]), bounds)
-    return first + abilities.shape[1]
-
-
-@wp.func
-def put_travel_used(
-    m: Machine,
-    setpoint: Motion,
-    cab_frame: int,
-    first: int,
-    bounds: wp.array(dtype=wp.float32),
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
-) -> int:
-    """Write the shares of their travel that carriage and turntable use, in the frame asked for."""
-    p = setpoint.position
-    used = vec2(
-        share_of_limit(p[0], m.position_min[0], m.position_max[0]),
-        share_of_limit(p[1], m.position_min[1], m.position_max[1]),
-    )
-    if cab_frame != 0:
-        used = turned(used[0], used[1], heading(setpoint))
-    k = put_entry(out, i, first, used[0], bounds)
-    k = put_entry(out, i, k, used[1], bounds)
-    return put_entry(out, i, k, share_of_limit(p[8], m.position_min[8], m.position_max[8]), bounds)
-
-
-# The observation of an environment: rows in float32, sensor errors, preview, and stacking.
-
-
-FORCE = wp.constant(real(SCALES["reference_force"]))
-CARRIAGE = wp.constant(real(SCALES["carriage"]))
-CARRIAGE_RATE = wp.constant(real(SCALES["carriage_rate"]))
-ACCELERATION = wp.constant(real(SCALES["acceleration"]))
-REFERENCE_FORCE = wp.constant(SLICES["reference_force"].start)
-REFERENCE_RATE = wp.constant(SLICES["reference_rate"].start)
-SIMULATOR_FORCE = wp.constant(SLICES["simulator_force"].start)
-SIMULATOR_RATE = wp.constant(SLICES["simulator_rate"].start)
+Firsts: Any = wp.struct(
+    type("Firsts", (), {"__module__": __name__, "__annotations__": {added.row.name: int for added in ADDED}})
+)
+"""Where each added row begins in a frame, -1 for one that is not there."""
 
 
 @wp.struct
-class Places:
-    """Where each row begins in a frame, -1 for one that is not there."""
+class View:
+    """The kernel's form of a layout and of how it is filled."""
 
     frame: int  # entries of a frame
-    force_error: int
-    rate_error: int
-    last_action: int
-    command: int
-    base_action: int
-    preview: int
-    memory: int
-    perceived: int
-    true_motion: int
-    machine: int
-    travel_used: int
+    first: Firsts
     preview_samples: int
     preview_stride: int  # time steps between samples
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
@@ -275,60 +380,61 @@ class Places:
     abilities: wp.array2d(dtype=wp.float32)  # what each machine can do, the constant rows
 
 
-def places_of(layout: Layout, seen: ObservationOptions, dt: float, noise: RandomizationOptions) -> Any:
-    """The kernel's form of a layout, but for what machines can do."""
-    places: Any = Places()
-    places.frame = layout.frame
-    for name in ("force_error", "rate_error", "last_action", "command", "base_action", "preview", "memory"):
-        setattr(places, name, layout.first(name))
-    places.perceived, places.true_motion = (
-        layout.first("perceived_reference_force"),
-        layout.first("true_carriage"),
-    )
-    places.machine, places.travel_used = layout.first(MACHINE[0].name), layout.first("travel_used")
-    places.preview_samples = seen.preview
-    places.preview_stride = max(1, round(seen.preview_spacing / dt))
-    places.cab_frame = int(seen.frame == "cab")
-    places.modeled = int(seen.simulator_cue == "model")
-    places.force_noise, places.rate_noise = noise.force_noise, noise.rate_noise
-    return places
+def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[float, float]) -> Any:
+    """The kernel's form of a layout, but for what machines can do.
+
+    Args:
+        layout: Of the observation.
+        seen: Its options.
+        dt: Time step, s.
+        noise: Standard deviations of specific force, m/s^2, and angular velocity, rad/s, in the cab.
+    """
+    view: Any = View()
+    view.frame = layout.frame
+    for added in ADDED:
+        setattr(view.first, added.row.name, layout.first(added.row.name))
+    view.preview_samples = seen.preview
+    view.preview_stride = max(1, round(seen.preview_spacing / dt))
+    view.cab_frame, view.modeled = int(seen.frame == "cab"), int(seen.simulator_cue == "model")
+    view.force_noise, view.rate_noise = noise
+    return view
 
 
 @wp.func
-def put_cues(
+def put_entry(
+    out: wp.array2d(dtype=wp.float32), i: int, k: int, value: real, bounds: wp.array(dtype=wp.float32)
+) -> int:
+    """Write an entry, clipped to its bound."""
+    # Once only: an entry that is written twice would count twice in the adjoint.
+    out[i, k] = wp.clamp(wp.float32(value), -bounds[k], bounds[k])
+    return 0
+
+
+@wp.func
+def put_vector(
     out: wp.array2d(dtype=wp.float32),
     i: int,
     first: int,
-    force: vec3,
-    rate: vec3,
+    value: Any,
+    size: int,
+    scale: real,
     bounds: wp.array(dtype=wp.float32),
 ) -> int:
-    """Write specific force, gravity at rest taken off z, and angular velocity."""
-    lifted = force + vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
-    k = put_vector(out, i, first, lifted, 3, FORCE, bounds)
-    return put_vector(out, i, k, rate, 3, real(1.0), bounds)
+    """Write the ``size`` entries of a row that begins at ``first``."""
+    for k in range(size):
+        put_entry(out, i, first + k, value[k] / scale, bounds)
+    return 0
 
 
 @wp.func
-def put_motion(
-    out: wp.array2d(dtype=wp.float32), i: int, first: int, m: Motion, bounds: wp.array(dtype=wp.float32)
-) -> int:
-    """Write the rows of the true motion."""
-    one = real(1.0)
-    k = put_vector(out, i, first, m.position, 2, CARRIAGE, bounds)
-    k = put_vector(out, i, k, m.rate, 2, CARRIAGE_RATE, bounds)
-    k = put_vector(out, i, k, m.displacement, 3, one, bounds)
-    k = put_vector(out, i, k, m.velocity, 3, one, bounds)
-    k = put_vector(out, i, k, m.beta, 3, one, bounds)
-    k = put_vector(out, i, k, m.beta_rate, 3, one, bounds)
-    k = put_entry(out, i, k, wp.sin(m.position[8]), bounds)
-    k = put_entry(out, i, k, wp.cos(m.position[8]), bounds)
-    return put_entry(out, i, k, m.rate[8], bounds)
+def lifted(force: vec3) -> vec3:
+    """A specific force, gravity at rest taken off z."""
+    return force + vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
 
 
 @wp.func
-def put_fixed(
-    p: Places,
+def put_sensed(
+    v: View,
     e: Episode,
     sample: int,
     fixed: wp.array2d(dtype=real),
@@ -336,37 +442,38 @@ def put_fixed(
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """Write the fixed rows, the cab's cues as sensors or the model tell them, and the car's minus them."""
+    """Write the simulator's rows, the cab's cues with the errors of its sensors, and the cues' errors."""
     # A generator of its own for each sample: what is seen does not depend on how often it is looked at.
     random = wp.rand_init(e.noise, sample)
-    noisy = p.force_noise + p.rate_noise > real(0.0) and p.modeled == 0
+    noisy = v.force_noise + v.rate_noise > real(0.0) and v.modeled == 0
     force_gain = real(1.0)
     rate_gain = real(1.0)
-    if p.modeled == 0:
+    if v.modeled == 0:
         force_gain = e.force_gain
         rate_gain = e.rate_gain
-    for k in range(SIMULATOR_FORCE):
-        put_entry(out, i, k, fixed[i, k], bounds)
+    for k in range(fixed.shape[1]):
+        of_force = k >= SIMULATOR_FORCE and k < SIMULATOR_FORCE + 3
+        of_rate = k >= SIMULATOR_RATE and k < SIMULATOR_RATE + 3
+        if not of_force and not of_rate:
+            put_entry(out, i, k, fixed[i, k], bounds)
     for k in range(3):
         force_noise = real(0.0)
         rate_noise = real(0.0)
         if noisy:
-            force_noise = p.force_noise / FORCE * real(wp.randn(random))
-            rate_noise = p.rate_noise * real(wp.randn(random))
+            force_noise = v.force_noise / wp.static(UNIT["simulator_force"]) * real(wp.randn(random))
+            rate_noise = v.rate_noise / wp.static(UNIT["simulator_rate"]) * real(wp.randn(random))
         force = fixed[i, SIMULATOR_FORCE + k] * force_gain + force_noise
         rate = fixed[i, SIMULATOR_RATE + k] * rate_gain + rate_noise
         put_entry(out, i, SIMULATOR_FORCE + k, force, bounds)
         put_entry(out, i, SIMULATOR_RATE + k, rate, bounds)
-        put_entry(out, i, p.force_error + k, fixed[i, REFERENCE_FORCE + k] - force, bounds)
-        put_entry(out, i, p.rate_error + k, fixed[i, REFERENCE_RATE + k] - rate, bounds)
-    for k in range(SIMULATOR_RATE + 3, fixed.shape[1]):
-        put_entry(out, i, k, fixed[i, k], bounds)
+        put_entry(out, i, v.first.force_error + k, fixed[i, REFERENCE_FORCE + k] - force, bounds)
+        put_entry(out, i, v.first.rate_error + k, fixed[i, REFERENCE_RATE + k] - rate, bounds)
     return 0
 
 
 @wp.func
 def put_preview(
-    p: Places,
+    v: View,
     drives: Drives,
     drive: int,
     sample: int,
@@ -377,27 +484,73 @@ def put_preview(
     """Write the car's cues ahead, the last one of the drive after its end."""
     first = drives.first[drive]
     last = drives.length[drive] - 1
-    for j in range(p.preview_samples):
-        ahead = first + wp.min(sample + (j + 1) * p.preview_stride, last)
-        put_cues(out, i, p.preview + 6 * j, drives.force[ahead], drives.rate[ahead], bounds)
+    for j in range(v.preview_samples):
+        ahead = first + wp.min(sample + (j + 1) * v.preview_stride, last)
+        k = v.first.preview + 6 * j
+        put_vector(out, i, k, lifted(drives.force[ahead]), 3, wp.static(UNIT["reference_force"]), bounds)
+        put_vector(out, i, k + 3, drives.rate[ahead], 3, wp.static(UNIT["reference_rate"]), bounds)
     return 0
 
 
 @wp.func
-def put_memory(
-    p: Places,
-    drives: Drives,
-    drive: int,
-    sample: int,
-    memory: wp.array2d(dtype=wp.float32),
+def put_perceived(
+    f: Firsts, s: State, bounds: wp.array(dtype=wp.float32), out: wp.array2d(dtype=wp.float32), i: int
+) -> int:
+    """Write the perceived cues."""
+    car = s.perceived_reference
+    cab = s.perceived_simulator
+    car_force = wp.static(UNIT["perceived_reference_force"])
+    cab_force = wp.static(UNIT["perceived_simulator_force"])
+    car_rate = wp.static(UNIT["perceived_reference_rate"])
+    cab_rate = wp.static(UNIT["perceived_simulator_rate"])
+    put_vector(out, i, f.perceived_reference_force, lifted(car.force), 3, car_force, bounds)
+    put_vector(out, i, f.perceived_reference_rate, car.rate, 3, car_rate, bounds)
+    put_vector(out, i, f.perceived_simulator_force, lifted(cab.force), 3, cab_force, bounds)
+    put_vector(out, i, f.perceived_simulator_rate, cab.rate, 3, cab_rate, bounds)
+    return 0
+
+
+@wp.func
+def put_true_motion(
+    f: Firsts, m: Motion, bounds: wp.array(dtype=wp.float32), out: wp.array2d(dtype=wp.float32), i: int
+) -> int:
+    """Write the true motion."""
+    turntable = vec2(wp.sin(m.position[8]), wp.cos(m.position[8]))
+    put_vector(out, i, f.true_carriage, m.position, 2, wp.static(UNIT["true_carriage"]), bounds)
+    put_vector(out, i, f.true_carriage_rate, m.rate, 2, wp.static(UNIT["true_carriage_rate"]), bounds)
+    put_vector(out, i, f.true_displacement, m.displacement, 3, wp.static(UNIT["true_displacement"]), bounds)
+    put_vector(out, i, f.true_velocity, m.velocity, 3, wp.static(UNIT["true_velocity"]), bounds)
+    put_vector(out, i, f.true_beta, m.beta, 3, wp.static(UNIT["true_beta"]), bounds)
+    put_vector(out, i, f.true_beta_rate, m.beta_rate, 3, wp.static(UNIT["true_beta_rate"]), bounds)
+    put_vector(out, i, f.true_turntable, turntable, 2, wp.static(UNIT["true_turntable"]), bounds)
+    put_entry(out, i, f.true_turntable_rate, m.rate[8] / wp.static(UNIT["true_turntable_rate"]), bounds)
+    return 0
+
+
+@wp.func
+def put_machine(
+    v: View,
+    which: int,
+    m: Machine,
+    setpoint: Motion,
     bounds: wp.array(dtype=wp.float32),
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """Write the low-passed cues of the car."""
-    row = drives.first[drive] + wp.min(sample, drives.length[drive] - 1)
-    for k in range(memory.shape[1]):
-        put_entry(out, i, p.memory + k, real(memory[row, k]), bounds)
+    """Write what the machine can do, constants of the batch, and the shares of travel it uses."""
+    for k in range(v.abilities.shape[1]):
+        put_entry(out, i, v.first.carriage_travel + k, real(v.abilities[which, k]), bounds)
+    p = setpoint.position
+    used = vec2(
+        share_of_limit(p[0], m.position_min[0], m.position_max[0]),
+        share_of_limit(p[1], m.position_min[1], m.position_max[1]),
+    )
+    if v.cab_frame != 0:
+        used = turned(used[0], used[1], heading(setpoint))
+    turntable = share_of_limit(p[8], m.position_min[8], m.position_max[8])
+    put_entry(out, i, v.first.travel_used, used[0], bounds)
+    put_entry(out, i, v.first.travel_used + 1, used[1], bounds)
+    put_entry(out, i, v.first.travel_used + 2, turntable, bounds)
     return 0
 
 
@@ -419,40 +572,40 @@ def repeat_frame(out: wp.array2d(dtype=wp.float32), i: int, frame: int) -> int:
 
 
 @wp.func
-def seen_motion(p: Places, m: Motion) -> Motion:
+def axes_in_view(v: View, m: Motion, values: vec9) -> vec9:
+    """Values of the axes in the frame of the observation."""
+    if v.cab_frame != 0:
+        return to_cab(m, values)
+    return values
+
+
+@wp.func
+def motion_in_view(v: View, m: Motion) -> Motion:
     """A motion in the frame of the observation."""
-    if p.cab_frame != 0:
+    if v.cab_frame != 0:
         return motion_in_cab(m)
     return m
 
 
 @wp.func
-def seen_axes(p: Places, m: Motion, v: vec9) -> vec9:
-    """Values of the axes in the frame of the observation."""
-    if p.cab_frame != 0:
-        return to_cab(m, v)
-    return v
-
-
-@wp.func
-def seen_acceleration(p: Places, s: State) -> vec9:
-    """The acceleration that the observation tells: of the true motion, or of the set-points."""
-    if p.modeled != 0:
+def acceleration_in_view(v: View, s: State) -> vec9:
+    """The acceleration shown, of the true motion or of the set-points, in the machine's frame."""
+    if v.modeled != 0:
         return s.setpoint_acceleration
     return s.acceleration
 
 
 @wp.func
-def seen_cues(p: Places, m: Machine, s: State) -> Cues:
-    """The cab's cues that the observation tells, likewise."""
-    if p.modeled != 0:
+def cues_in_view(v: View, m: Machine, s: State) -> Cues:
+    """The cab's cues shown: those of the true motion, or those of the set-points."""
+    if v.modeled != 0:
         return simulator_cues(m, s.setpoint, s.setpoint_acceleration)
     return s.simulator_cue
 
 
 @wp.func
 def write_frame(
-    p: Places,
+    v: View,
     drives: Drives,
     drive: int,
     e: Episode,
@@ -468,30 +621,32 @@ def write_frame(
     out: wp.array2d(dtype=wp.float32),
     i: int,
 ) -> int:
-    """The newest frame of an environment's observation; ``fixed`` gets the fixed rows it is made of.
+    """Write the newest frame of an environment's observation, each row that is there.
 
-    ``which`` is the number of the machine.
+    ``which`` is the number of the machine; ``fixed`` gets the simulator's rows the frame is made of.
     """
-    seen = seen_motion(p, s.setpoint)
-    acceleration = seen_axes(p, s.setpoint, seen_acceleration(p, s))
-    write_observation(machine, s, seen, acceleration, seen_cues(p, machine, s), fixed, i)
-    put_fixed(p, e, s.sample, fixed, bounds, out, i)
+    f = v.first
+    acceleration = axes_in_view(v, s.setpoint, acceleration_in_view(v, s))
+    motion = motion_in_view(v, s.setpoint)
+    write_observation(machine, s, motion, acceleration, cues_in_view(v, machine, s), fixed, i)
+    put_sensed(v, e, s.sample, fixed, bounds, out, i)
     for k in range(now.shape[1]):
-        put_entry(out, i, p.last_action + k, real(now[i, k]), bounds)
-    if p.command >= 0:
-        put_vector(out, i, p.command, command, 9, ACCELERATION, bounds)
-    if p.base_action >= 0:
-        put_vector(out, i, p.base_action, seen_axes(p, s.setpoint, base), 9, ACCELERATION, bounds)
-    if p.preview >= 0:
-        put_preview(p, drives, drive, s.sample, bounds, out, i)
-    if p.memory >= 0:
-        put_memory(p, drives, drive, s.sample, memory, bounds, out, i)
-    if p.perceived >= 0:
-        k = put_cues(out, i, p.perceived, s.perceived_reference.force, s.perceived_reference.rate, bounds)
-        put_cues(out, i, k, s.perceived_simulator.force, s.perceived_simulator.rate, bounds)
-    if p.true_motion >= 0:
-        put_motion(out, i, p.true_motion, seen_motion(p, s.motion), bounds)
-    if p.machine >= 0:
-        put_abilities(p.abilities, which, p.machine, bounds, out, i)
-        put_travel_used(machine, s.setpoint, p.cab_frame, p.travel_used, bounds, out, i)
-    return p.frame
+        put_entry(out, i, f.last_action + k, real(now[i, k]), bounds)
+    if f.command >= 0:
+        put_vector(out, i, f.command, command, 9, wp.static(UNIT["command"]), bounds)
+    if f.base_action >= 0:
+        added = axes_in_view(v, s.setpoint, base)
+        put_vector(out, i, f.base_action, added, 9, wp.static(UNIT["base_action"]), bounds)
+    if f.preview >= 0:
+        put_preview(v, drives, drive, s.sample, bounds, out, i)
+    if f.memory >= 0:
+        row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
+        for k in range(memory.shape[1]):
+            put_entry(out, i, f.memory + k, real(memory[row, k]), bounds)
+    if f.perceived_reference_force >= 0:
+        put_perceived(f, s, bounds, out, i)
+    if f.true_carriage >= 0:
+        put_true_motion(f, motion_in_view(v, s.motion), bounds, out, i)
+    if f.carriage_travel >= 0:
+        put_machine(v, which, machine, s.setpoint, bounds, out, i)
+    return v.frame

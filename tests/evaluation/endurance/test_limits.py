@@ -7,10 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.platform.kinematics import leg_motion
 from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
-from motion_cueing.evaluation.endurance.checks import KINDS, TOLERANCE, TrueLimits, legs_of
+from motion_cueing.evaluation.endurance.checks import KINDS, TOLERANCE, TrueLimits
 
-from ...platform.machines_under_test import PRESETS
+from ...envs.platform.platforms_under_test import PRESETS
 from ...reference import MachineModel
 from ...reference import kinematics as plain
 from ..studies import PAPER, bend
@@ -30,7 +31,7 @@ def lengths(hexapod, pose):
 @pytest.mark.parametrize("platform", PRESETS.values(), ids=list(PRESETS))
 def test_legs_are_distances_and_their_rates_derivatives(platform):
     hexapod = platform.hexapod
-    found = legs_of(hexapod, POSE, POSE_RATE)
+    found = leg_motion(hexapod, POSE, POSE_RATE)
     np.testing.assert_allclose(found.extension, lengths(hexapod, POSE) - hexapod.neutral_lengths, atol=1e-13)
     ahead, behind = (lengths(hexapod, POSE + sign * EPSILON * POSE_RATE) for sign in (1.0, -1.0))
     np.testing.assert_allclose(found.rate, (ahead - behind) / (2.0 * EPSILON), atol=1e-8)
@@ -68,7 +69,7 @@ def test_a_leg_beyond_its_stroke_is_counted_by_the_pose_alone():
     motion, down = motions(3), np.linspace(0.0, 1.0, 100_001)
     poses = np.zeros((len(down), 6))
     poses[:, 2] = down
-    legs = legs_of(PAPER.hexapod, poses, np.zeros_like(poses)).extension
+    legs = leg_motion(PAPER.hexapod, poses, np.zeros_like(poses)).extension
     first = int(np.argmax((legs < PAPER.hexapod.extension[0] - 1e-5).any(axis=1)))
     motion["displacement"][1, 1, 2] = down[first]
     motion["position"][1, 1, 2:8] = legs[first]
@@ -141,8 +142,8 @@ def test_a_platform_turned_over_is_no_pose():
     pose = np.zeros((1, 6))
     pose[0, 3] = np.pi
     motion["beta"][0, 0, 0] = np.pi
-    motion["position"][0, 0, 2:8] = legs_of(PAPER.hexapod, pose, np.zeros((1, 6))).extension[0]
-    assert legs_of(PAPER.hexapod, pose, np.zeros((1, 6))).clearance[0] < 0.0
+    motion["position"][0, 0, 2:8] = leg_motion(PAPER.hexapod, pose, np.zeros((1, 6))).extension[0]
+    assert leg_motion(PAPER.hexapod, pose, np.zeros((1, 6))).clearance[0] < 0.0
     assert exceeded(motion)["pose"] == [[0, 0]]
 
 

@@ -50,9 +50,9 @@ class Teacher:
     """
 
     def __init__(self, policy: str, batch: Batch) -> None:
-        if batch.options.randomization.build is not None:
+        if batch.options.randomization.platform is not None:
             raise ConfigurationError(
-                f"the teacher {policy} is made for one machine; leave randomization.build out"
+                f"the teacher {policy} is made for one machine; leave randomization.platform out"
             )
         self._batch = batch
         self._made = make_policy(policy, batch.platform)
