@@ -9,9 +9,8 @@ from typing import Final, Literal
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
-from ..envs.settings import from_dict, read_yaml
+from ..envs.settings import read_yaml
 from .policy import ForeknowingPolicy, NoMotion, Policy
-from .presets import named
 from .washout.families import (
     ALGORITHMS,
     CeilingWashout,
@@ -26,8 +25,8 @@ DESCRIPTIONS: Final = {
     "mpc": "predictive control that knows nothing of the drive ahead",
     "mpc-preview": "predictive control that sees 2 s of the drive ahead",
     "mpc-full": "predictive control that knows the drive over its whole horizon, 8 s",
-    "nmpc": "nonlinear predictive control that knows nothing of the drive ahead",
-    "nmpc-preview": "nonlinear predictive control that sees 2 s of the drive ahead",
+    "nmpc": "mpc with exact equations, solved until it converges",
+    "nmpc-preview": "mpc-preview with exact equations, solved until it converges",
 }
 """One line about each by name."""
 
@@ -41,33 +40,24 @@ def make_predictive(name: str, platform: Platform) -> Policy | ForeknowingPolicy
     Raises:
         ConfigurationError: a library is missing; the message says how to get it.
     """
-    from .mpc import NmpcParameters, load_mpc, make_mpc, make_nmpc
+    from .mpc import load_mpc, make_mpc
 
-    if name.startswith("nmpc"):
-        return make_nmpc(platform, NmpcParameters(mpc=load_mpc(name.removeprefix("n"))), name)
     return make_mpc(platform, load_mpc(name), name)
 
 
-def predictive_from_file(
-    values: dict[str, object], path: str | Path, platform: Platform
-) -> Policy | ForeknowingPolicy:
+def predictive_from_file(path: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
     """The controller with the parameters of a file.
 
     Args:
-        values: Of the file; its ``algorithm`` is one of :data:`PREDICTIVE`.
-        path: Of the file, for its name and messages.
+        path: Of the file, whose ``algorithm`` is one of :data:`PREDICTIVE`.
         platform: The machine.
 
     Raises:
         ConfigurationError: a field is wrong, or a library is missing.
     """
-    from .mpc import MpcParameters, NmpcParameters, make_mpc, make_nmpc
+    from .mpc import load_mpc, make_mpc
 
-    if values["algorithm"] == "nmpc":
-        nonlinear = from_dict(NmpcParameters, named(NmpcParameters, values, path), str(path))
-        return make_nmpc(platform, nonlinear, Path(path).stem)
-    linear = from_dict(MpcParameters, named(MpcParameters, values, path), str(path))
-    return make_mpc(platform, linear, Path(path).stem)
+    return make_mpc(platform, load_mpc(path), Path(path).stem)
 
 
 # Policies by name or file.
@@ -155,5 +145,5 @@ def _from_file(path: Path, platform: Platform) -> Policy | ForeknowingPolicy:
     values = read_yaml(path)
     algorithm = check_algorithm(algorithm_of(values), path, (*ALGORITHMS, *PREDICTIVE))
     if isinstance(values, dict) and algorithm in PREDICTIVE:
-        return predictive_from_file(values, path, platform)
+        return predictive_from_file(path, platform)
     return make_washout(load_parameters(path), platform.cab)

@@ -173,7 +173,6 @@ def imports(node: ast.AST, deferred: bool = False) -> Iterator[tuple[str, bool]]
 EXTRA_OF = {
     "train": "train",
     "baselines/mpc": "optimal",
-    "baselines/nmpc": "optimal",
     "baselines/optimum": "optimal",
     "baselines/symbolic": "optimal",
 }

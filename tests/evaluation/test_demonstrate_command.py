@@ -28,7 +28,7 @@ from motion_cueing.train.algorithms.dagger.demonstrations import (
     load_index,
 )
 
-from ..optimum.drives import surge
+from ..baselines.optimum.drives import surge
 
 WASHOUT = ("--policy", "classical")
 

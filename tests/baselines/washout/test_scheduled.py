@@ -15,7 +15,7 @@ from motion_cueing.envs.errors import ActionError, ConfigurationError, DataError
 from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator
 
-from ..env.tasks import drive
+from ...env.tasks import drive
 
 N = 4
 

@@ -24,7 +24,7 @@ from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.train.config import TrainingConfig
 
-from .drives import trace
+from ..drives import trace
 
 PAPER = get_platform("paper")
 START = load_washout("classical")

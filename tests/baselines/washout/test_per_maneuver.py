@@ -19,7 +19,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import to_dict
 from motion_cueing.evaluation import measure, rollout
 
-from .drives import trace
+from ..drives import trace
 
 PAPER = get_platform("paper")
 LOCKED = get_platform("paper-no-turntable")

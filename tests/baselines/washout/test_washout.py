@@ -29,7 +29,7 @@ from motion_cueing.envs.settings import load, save, to_dict
 from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.evaluation import rollout
 
-from .drives import boundless, trace
+from ..drives import boundless, trace
 
 OPEN = (HighPass(), HighPass(), HighPass())
 

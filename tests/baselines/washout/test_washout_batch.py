@@ -22,7 +22,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.evaluation import measure, rollout
 
-from .drives import trace
+from ..drives import trace
 
 PAPER = get_platform("paper")
 DRIVES = [

@@ -24,7 +24,7 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import save, to_dict
 from motion_cueing.evaluation import measure, rollout
 
-from .drives import DT, boundless, trace
+from ..drives import DT, boundless, trace
 from .memories import memories
 
 PAPER = get_platform("paper")
