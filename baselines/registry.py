@@ -11,15 +11,8 @@ from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
 from ..envs.settings import read_yaml
 from .policy import ForeknowingPolicy, NoMotion, Policy
-from .washout.families import (
-    ALGORITHMS,
-    CeilingWashout,
-    algorithm_of,
-    check_algorithm,
-    family_presets,
-    load_parameters,
-    make_washout,
-)
+from .washout import PerManeuverWashout, make_washout
+from .washout.families import FAMILIES, algorithm_of, check_algorithm, family_presets, load_parameters
 
 DESCRIPTIONS: Final = {
     "mpc": "predictive control that knows nothing of the drive ahead",
@@ -91,14 +84,16 @@ def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Polic
 
 _ENTRIES: Final[Mapping[str, Entry]] = {
     NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
-    CeilingWashout.name: Entry(
-        "classical with the best set for each standard maneuver: the washout's ceiling", CeilingWashout
+    PerManeuverWashout.name: Entry(
+        "an oracle: classical with the best set for each standard maneuver", PerManeuverWashout
     ),
     **{name: Entry(told, _predictive(name)) for name, told in DESCRIPTIONS.items()},
     "optimum": Entry("the least J there is: the whole drive known, its motion planned", _optimum("J")),
     "optimum-perceived": Entry("the same for the least perceived J", _optimum("perceived")),
 }
 """Policies by name, beside the presets of the washouts."""
+
+_RENAMED: Final = {"classical-ceiling": PerManeuverWashout.name}
 
 _DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
@@ -117,7 +112,7 @@ def describe_policy(name: str) -> str:
     """One line about a policy."""
     if name in _ENTRIES:
         return _ENTRIES[name].description
-    return load_parameters(name).description
+    return str(load_parameters(name).description)
 
 
 def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
@@ -138,12 +133,12 @@ def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPol
         raise DataError(
             f"{name}: not a policy; expected the .yaml file of a washout or a predictive controller"
         )
-    raise UnknownNameError("policy", str(name), policy_names())
+    raise UnknownNameError("policy", str(name), policy_names(), _RENAMED)
 
 
 def _from_file(path: Path, platform: Platform) -> Policy | ForeknowingPolicy:
     values = read_yaml(path)
-    algorithm = check_algorithm(algorithm_of(values), path, (*ALGORITHMS, *PREDICTIVE))
+    algorithm = check_algorithm(algorithm_of(values), path, (*FAMILIES, *PREDICTIVE))
     if isinstance(values, dict) and algorithm in PREDICTIVE:
         return predictive_from_file(path, platform)
     return make_washout(load_parameters(path), platform.cab)

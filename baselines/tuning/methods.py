@@ -11,10 +11,8 @@ from numpy.lib.recfunctions import structured_to_unstructured
 from numpy.typing import NDArray
 
 from ...envs.settings import NonNegative, configuration
-from ..washout import WashoutParameters
 from ..washout.batch import WashoutBatch
-from ..washout.kernels.blocks import Parameters
-from ..washout.policy import kernel_parameters
+from ..washout.families import family_of
 from .objective import Objective
 from .space import WashoutSpace
 
@@ -326,10 +324,9 @@ def _kernel_slopes(space: WashoutSpace, place: Floats, objective: Objective) -> 
 
 
 def _kernel_values(space: WashoutSpace, place: Floats, objective: Objective) -> Floats:
-    decoded = space.decode(place)
-    assert isinstance(decoded, WashoutParameters), "the options of a search refuse other families"
-    parameters = kernel_parameters(decoded, objective.platform.cab)
-    values: Floats = _flat(wp.array([parameters], dtype=Parameters, device="cpu").numpy())[0]
+    kernels = family_of(space.start).kernels
+    parameters = kernels.values(space.decode(place), objective.platform.cab, objective.drives[0].dt)
+    values: Floats = _flat(wp.array([parameters], dtype=kernels.parameters, device="cpu").numpy())[0]
     return values
 
 

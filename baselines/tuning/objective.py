@@ -13,7 +13,7 @@ from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from ..washout.batch import WashoutBatch
-from ..washout.families import AnyWashout, kernels_of
+from ..washout.families import AnyWashout
 
 Floats = NDArray[np.float64]
 Measure = Literal["J", "perceived"]
@@ -90,7 +90,7 @@ class Objective:
         """
         counted = list(range(len(self.drives))) if drives is None else list(drives)
         driven = [*counted, *guards]
-        batch = WashoutBatch(sets, [self.drives[i] for i in driven], self.platform, kernels_of(sets[0]))
+        batch = WashoutBatch(sets, [self.drives[i] for i in driven], self.platform)
         scores = batch.scores(threads=self.threads)
         cue = scores.cue_error[:, : len(counted)].mean(axis=1)
         perceived = scores.perceived_error[:, : len(counted)].mean(axis=1)

@@ -16,7 +16,7 @@ from ...envs.errors import ConfigurationError, DataError
 from ...envs.maneuvers import RandomDrives, drive_seeds
 from ...envs.settings import Positive, configuration, from_dict, to_dict
 from ...envs.storage import write_text
-from ..washout.families import AnyWashout, algorithm_of
+from ..washout.families import AnyWashout, family_of
 from .methods import Descent, Evolution, Found, Method
 from .objective import LIMIT_SLOPE, LIMIT_STEP, Measure, Objective
 from .space import WashoutSpace
@@ -68,8 +68,8 @@ class TuningOptions:
     def __post_init__(self) -> None:
         if self.method == "gradient" and self.objective != "J":
             raise ConfigurationError("objective perceived has no gradient; use method cma")
-        if self.method == "gradient" and algorithm_of(self.start) != "classical":
-            raise ConfigurationError("only the classical washout has a gradient; use method cma")
+        if self.method == "gradient" and family_of(self.start).kernels.act is None:
+            raise ConfigurationError(f"{family_of(self.start).title} has no gradient; use method cma")
         seen = drive_seeds(self.drives, self.drives_seed) if TRAIN in self.maneuvers else []
         if set(seen) & set(drive_seeds(HELD_OUT, HELD_OUT_SEED)):
             raise ConfigurationError(f"drives_seed {self.drives_seed} gives drives that are held out")

@@ -170,7 +170,7 @@ def test_every_family_is_tuned_the_same_way(algorithm, start, words, tmp_path, c
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (["--method", "gradient"], "only the classical washout has a gradient; use method cma"),
+        (["--method", "gradient"], "has no gradient; use method cma"),
         (
             ["--start", "classical"],
             "a set of the classical washout; give one of the adaptive washout",

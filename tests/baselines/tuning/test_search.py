@@ -17,8 +17,15 @@ from motion_cueing.baselines.tuning import space as space_module
 from motion_cueing.baselines.tuning.methods import Descent, Evolution, Found, place_gradient
 from motion_cueing.baselines.tuning.objective import LIMIT_STEP, Objective, penalty
 from motion_cueing.baselines.tuning.search import Record, Search, TuningOptions, load_record
-from motion_cueing.baselines.tuning.space import COORDINATES, Coordinate, WashoutSpace
-from motion_cueing.baselines.washout import HighPass, load_washout, washout_presets
+from motion_cueing.baselines.tuning.space import WashoutSpace
+from motion_cueing.baselines.washout import (
+    FAMILIES,
+    Coordinate,
+    Family,
+    HighPass,
+    load_washout,
+    washout_presets,
+)
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.envs.platform import get_platform
@@ -29,6 +36,7 @@ from ..drives import trace
 PAPER = get_platform("paper")
 START = load_washout("classical")
 SPACE = WashoutSpace(START)
+CLASSICAL = FAMILIES["classical"]
 DRIVES = [
     trace(6.0, lambda t: np.column_stack([0.5 * np.sin(t), 1.2 * np.sin(0.8 * t)]), name="weave"),
     trace(6.0, lambda t: np.column_stack([np.where(t > 1.0, 1.0, 0.0), 0.0 * t]), name="step"),
@@ -204,16 +212,21 @@ def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path)
             Search(changed, Objective(DRIVES, get_platform("paper"))).resume(record)
 
 
-def wider(coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
-    """The same with another end of the last range."""
+def wider(family: Family) -> tuple[Coordinate, ...]:
+    """Its coordinates with another end of the last range."""
+    coordinates = family.coordinates
     return (*coordinates[:-1], replace(coordinates[-1], high=2.0 * coordinates[-1].high))
 
 
 @pytest.mark.parametrize(
     ("where", "name", "value"),
     [
-        (space_module, "COORDINATES", {"classical": wider(COORDINATES["classical"])}),
-        (space_module, "COORDINATES", {"classical": COORDINATES["classical"][::-1]}),
+        (space_module, "family_of", lambda start: replace(CLASSICAL, coordinates=wider(CLASSICAL))),
+        (
+            space_module,
+            "family_of",
+            lambda start: replace(CLASSICAL, coordinates=CLASSICAL.coordinates[1:]),
+        ),
         (evolution, "STEP", 0.2),
         (evolution, "DRIVES", 12),
         (evolution, "GUARDS", 12),

@@ -20,9 +20,8 @@ from motion_cueing.baselines.washout import (
     load_washout,
     washout_presets,
 )
-from motion_cueing.baselines.washout.families import family_presets
+from motion_cueing.baselines.washout.families import family_presets, load_parameters
 from motion_cueing.baselines.washout.kernels.blocks import Memory
-from motion_cueing.baselines.washout.optimal import load_optimal
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import load, save, to_dict
@@ -279,7 +278,7 @@ def test_a_name_and_a_description_may_stand_in_any_file_or_not(tmp_path):
         path = tmp_path / f"my-{algorithm}.yaml"
         path.write_text(f"algorithm: {algorithm}\n")
         if algorithm == "optimal":
-            path.write_text(yaml.safe_dump(unnamed(load_optimal("optimal-washout"))))
+            path.write_text(yaml.safe_dump(unnamed(load_parameters("optimal-washout"))))
         assert make_policy(path, platform).name == f"my-{algorithm}"
         path.write_text(path.read_text() + "name: other\ndescription: of mine\n")
         assert make_policy(path, platform).name in ("other", "my-mpc")

@@ -13,10 +13,10 @@ from motion_cueing.baselines.washout import (
     HighPass,
     LowPass,
     TiltCoordination,
+    WashoutParameters,
     load_washout,
 )
 from motion_cueing.baselines.washout.batch import WashoutBatch
-from motion_cueing.baselines.washout.parameters import WashoutParameters
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
