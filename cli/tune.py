@@ -305,7 +305,7 @@ def _held_out(search: Search) -> Objective:
 
 
 def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
-    found = objective.judge([start, tuned])
+    found = objective.evaluate([start, tuned])
     return [
         f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "
         f"{100.0 * found.at_limit[i]:.3f} % of the time at a limit, "
