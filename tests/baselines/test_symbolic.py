@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import casadi as cs
 import numpy as np
 import pytest
@@ -96,14 +93,3 @@ def test_limits_are_those_of_the_machine():
     for platform in PRESETS.values():
         for name, values in actuator_limits(platform).items():
             assert np.array_equal(SymbolicMachine(platform).limits[name], values)
-
-
-def test_without_casadi_the_error_says_what_to_install():
-    code = (
-        "import sys; sys.modules['casadi'] = None\n"
-        "from motion_cueing.envs.errors import ConfigurationError\n"
-        "try:\n    import motion_cueing.baselines.symbolic\n"
-        "except ConfigurationError as error:\n    print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "pip install 'motion-cueing-gym[optimal]'" in done.stdout
