@@ -2,8 +2,7 @@
 
 from .policy import ForeknowingPolicy, NoMotion, Policy
 from .registry import default_policies, describe_policy, make_policy, policy_names
-from .washout.parameters import WashoutParameters
-from .washout.policy import ClassicalWashout
+from .washout import ClassicalWashout, WashoutParameters
 
 __all__ = [
     "ClassicalWashout",

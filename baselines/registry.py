@@ -9,25 +9,17 @@ from typing import Final, Literal
 
 from ..envs.errors import DataError, UnknownNameError
 from ..envs.platform.machines import Platform
-from ..envs.settings import from_dict, read_yaml
+from ..envs.settings import read_yaml
 from .policy import ForeknowingPolicy, NoMotion, Policy
-from .presets import named
-from .washout.families import (
-    ALGORITHMS,
-    CeilingWashout,
-    algorithm_of,
-    check_algorithm,
-    family_presets,
-    load_parameters,
-    make_washout,
-)
+from .washout import PerManeuverWashout, make_washout
+from .washout.families import FAMILIES, algorithm_of, check_algorithm, family_presets, load_parameters
 
 DESCRIPTIONS: Final = {
     "mpc": "predictive control that knows nothing of the drive ahead",
     "mpc-preview": "predictive control that sees 2 s of the drive ahead",
     "mpc-full": "predictive control that knows the drive over its whole horizon, 8 s",
-    "nmpc": "nonlinear predictive control that knows nothing of the drive ahead",
-    "nmpc-preview": "nonlinear predictive control that sees 2 s of the drive ahead",
+    "nmpc": "mpc with exact equations, solved until it converges",
+    "nmpc-preview": "mpc-preview with exact equations, solved until it converges",
 }
 """One line about each by name."""
 
@@ -41,33 +33,24 @@ def make_predictive(name: str, platform: Platform) -> Policy | ForeknowingPolicy
     Raises:
         ConfigurationError: a library is missing; the message says how to get it.
     """
-    from .mpc import NmpcParameters, load_mpc, make_mpc, make_nmpc
+    from .mpc import load_mpc, make_mpc
 
-    if name.startswith("nmpc"):
-        return make_nmpc(platform, NmpcParameters(mpc=load_mpc(name.removeprefix("n"))), name)
     return make_mpc(platform, load_mpc(name), name)
 
 
-def predictive_from_file(
-    values: dict[str, object], path: str | Path, platform: Platform
-) -> Policy | ForeknowingPolicy:
+def predictive_from_file(path: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
     """The controller with the parameters of a file.
 
     Args:
-        values: Of the file; its ``algorithm`` is one of :data:`PREDICTIVE`.
-        path: Of the file, for its name and messages.
+        path: Of the file, whose ``algorithm`` is one of :data:`PREDICTIVE`.
         platform: The machine.
 
     Raises:
         ConfigurationError: a field is wrong, or a library is missing.
     """
-    from .mpc import MpcParameters, NmpcParameters, make_mpc, make_nmpc
+    from .mpc import load_mpc, make_mpc
 
-    if values["algorithm"] == "nmpc":
-        nonlinear = from_dict(NmpcParameters, named(NmpcParameters, values, path), str(path))
-        return make_nmpc(platform, nonlinear, Path(path).stem)
-    linear = from_dict(MpcParameters, named(MpcParameters, values, path), str(path))
-    return make_mpc(platform, linear, Path(path).stem)
+    return make_mpc(platform, load_mpc(path), Path(path).stem)
 
 
 # Policies by name or file.
@@ -101,14 +84,16 @@ def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Polic
 
 _ENTRIES: Final[Mapping[str, Entry]] = {
     NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
-    CeilingWashout.name: Entry(
-        "classical with the best set for each standard maneuver: the washout's ceiling", CeilingWashout
+    PerManeuverWashout.name: Entry(
+        "an oracle: classical with the best set for each standard maneuver", PerManeuverWashout
     ),
     **{name: Entry(told, _predictive(name)) for name, told in DESCRIPTIONS.items()},
     "optimum": Entry("the least J there is: the whole drive known, its motion planned", _optimum("J")),
     "optimum-perceived": Entry("the same for the least perceived J", _optimum("perceived")),
 }
 """Policies by name, beside the presets of the washouts."""
+
+_RENAMED: Final = {"classical-ceiling": PerManeuverWashout.name}
 
 _DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
@@ -127,7 +112,7 @@ def describe_policy(name: str) -> str:
     """One line about a policy."""
     if name in _ENTRIES:
         return _ENTRIES[name].description
-    return load_parameters(name).description
+    return str(load_parameters(name).description)
 
 
 def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
@@ -148,12 +133,12 @@ def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPol
         raise DataError(
             f"{name}: not a policy; expected the .yaml file of a washout or a predictive controller"
         )
-    raise UnknownNameError("policy", str(name), policy_names())
+    raise UnknownNameError("policy", str(name), policy_names(), _RENAMED)
 
 
 def _from_file(path: Path, platform: Platform) -> Policy | ForeknowingPolicy:
     values = read_yaml(path)
-    algorithm = check_algorithm(algorithm_of(values), path, (*ALGORITHMS, *PREDICTIVE))
+    algorithm = check_algorithm(algorithm_of(values), path, (*FAMILIES, *PREDICTIVE))
     if isinstance(values, dict) and algorithm in PREDICTIVE:
-        return predictive_from_file(values, path, platform)
+        return predictive_from_file(path, platform)
     return make_washout(load_parameters(path), platform.cab)

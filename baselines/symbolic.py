@@ -1,4 +1,17 @@
-"""CasADi where it is installed, else a sentence that says how to get it."""
+"""The machine in CasADi's symbols: the twin of the kernels in ``envs``, for controllers that optimize.
+
+Kernels step a machine fast; an optimizer needs the same equations as expressions that it can differentiate.
+Nothing is simplified: both agree to round-off. The order of rotation is roll, pitch, yaw,
+beta = [phi, theta, psi], and V_I = L_IB V_B. Positions, rates and accelerations are columns of nine in
+the order of ``AXES``: carriage x, y; hexapod x, y, z, roll, pitch, yaw; turntable; m and rad from neutral.
+
+A leg's vector is d = L_IH A - B + S, Eqs. (12) and (13). With v = ddot and a = dddot,
+
+    l = |d| - L,    ldot = d.v / |d|,    lddot = (v.v + d.a - ldot^2) / |d|.
+
+Where there is a C compiler, functions become machine code with the same numbers (:func:`compiled`). Libraries
+lie in the cache folder under a hash of source and command, so nothing stale is loaded.
+"""
 
 from __future__ import annotations
 
@@ -34,11 +47,6 @@ cs: Any = casadi
 
 Expression = Any
 """A symbolic column vector or matrix: ``SX``, ``MX`` or ``DM``."""
-
-# Eqs. (4) to (9) in symbols: rotations and Euler rates, as ``envs.platform.kernels.geometry`` has them
-# in numbers.
-#
-# The order of rotation is roll, pitch, yaw, beta = [phi, theta, psi]; V_I = L_IB V_B.
 
 
 def rotation(beta: Expression) -> Expression:
@@ -94,13 +102,6 @@ def angular_acceleration(
 
 def _matrix(rows: tuple[tuple[Expression, ...], ...]) -> Expression:
     return cs.vertcat(*(cs.horzcat(*row) for row in rows))
-
-
-# Eqs. (12) and (13) in symbols, with their first and second time derivatives.
-#
-# A leg's vector is d = L_IH A - B + S, so with v = ddot and a = dddot
-#
-#     l = |d| - L,    ldot = d.v / |d|,    lddot = (v.v + d.a - ldot^2) / |d|.
 
 
 class Pose(NamedTuple):
@@ -181,13 +182,6 @@ def _joints(hexapod: Hexapod) -> list[tuple[Expression, Expression, float]]:
     return [(cs.DM(upper), cs.DM(neutral - np.array(lower)), float(length)) for upper, lower, length in parts]
 
 
-# A motion base in CasADi's symbols: the twin of the kernels in ``envs``, for controllers that optimize.
-#
-# Kernels step a machine fast; an optimizer needs the same equations as expressions it can differentiate.
-# Nothing is simplified: both agree to round-off. Positions, rates and accelerations are columns of nine in
-# the order of ``AXES``: carriage x, y; hexapod x, y, z, roll, pitch, yaw; turntable; m and rad from neutral.
-
-
 _ARGUMENTS: Final = ("position", "rate", "acceleration")
 
 
@@ -195,16 +189,14 @@ class SymbolicMachine:
     """Functions of one machine; each takes numbers or symbols, one column (9,) or many (9, n).
 
     Args:
-        platform: The machine. A missing subsystem is not left out: whoever optimizes holds it still.
+        platform: The machine. A missing subsystem stays among the axes; its limits hold it still.
 
     Attributes:
         platform: The machine.
         cues: (position, rate, acceleration) to specific force f_SS (3,), m/s^2, and angular velocity
             omega_SS (3,), rad/s, at the cab's reference point, Eqs. (1), (7), (36) to (40).
-        head_cues: The same at the driver's head.
         legs: (position) to leg extensions (6,), Eqs. (12) and (13), m.
         leg_rates: (position, rate) to (6,), m/s.
-        leg_accelerations: (position, rate, acceleration) to (6,), m/s^2.
         clearance: (position) to det J over its value at neutral.
         limits: position_min, position_max, velocity, acceleration, each (9,) in the order of
             ``ACTUATORS``; infinite where there is none, 0 to 0 the travel of a missing subsystem.
@@ -216,13 +208,10 @@ class SymbolicMachine:
         q, v, a = (cs.SX.sym(name, N_AXES) for name in _ARGUMENTS)
         legs = leg_motion(platform.hexapod, _pose(q, v, a))
         cab = cs.DM(platform.cab.reference_point)
-        head = cab + cs.DM(platform.cab.head)
         clear = clearance(platform.hexapod, q[2:5], q[5:8])
         self.cues = cs.Function("cues", [q, v, a], list(cues(cab, q, v, a)))
-        self.head_cues = cs.Function("head_cues", [q, v, a], list(cues(head, q, v, a)))
         self.legs = cs.Function("legs", [q], [legs.extension])
         self.leg_rates = cs.Function("leg_rates", [q, v], [legs.rate])
-        self.leg_accelerations = cs.Function("leg_accelerations", [q, v, a], [legs.acceleration])
         self.clearance = cs.Function("clearance", [q], [clear])
 
     def leg_motion(self, q: Expression, v: Expression, a: Expression) -> Legs:
@@ -266,12 +255,6 @@ def _pose(q: Expression, v: Expression, a: Expression) -> Pose:
     return Pose(q[2:5], q[5:8], v[2:5], v[5:8], a[2:5], a[5:8])
 
 
-# CasADi functions as machine code, where a C compiler is at hand; kept for the next time.
-#
-# A library lies in the cache folder under a hash of its C source and of the compiler's command, so
-# nothing stale is ever loaded. Without a compiler the function stays what it is: slower, and the same.
-
-
 _FLAGS: Final = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
 """No flag that would change arithmetic: results are those of the function not compiled, to the bit.
 
@@ -280,8 +263,8 @@ Compilers contract a * b + c to one rounding where the processor can, unless tol
 
 _COMPILERS: Final = ("cc", "gcc", "clang")
 
-_PATIENCE: Final = 300.0
-"""Longest time a compiler may take, s."""
+_COMPILER_TIMEOUT: Final = 300.0
+"""Longest time of a compilation, s."""
 
 
 def find_compiler() -> str | None:
@@ -291,7 +274,7 @@ def find_compiler() -> str | None:
 
 
 def compiled(function: Any) -> Any:
-    """The function as machine code, or as it is where that cannot be had.
+    """The function as machine code; the function itself where it cannot be compiled.
 
     Args:
         function: A CasADi function.
@@ -305,7 +288,7 @@ def compiled(function: Any) -> Any:
     key = hashlib.sha256("\n".join((*_FLAGS, compiler, platform.platform(), source)).encode()).hexdigest()
     library = cache_folder() / f"{function.name()}-{key}.so"
     try:
-        if not _is_whole(library):
+        if not _is_intact(library):
             code = _compile(compiler, source)
             write_bytes(library, code)
             write_text(_seal(library), hashlib.sha256(code).hexdigest())
@@ -319,8 +302,8 @@ def _seal(library: Path) -> Path:
     return library.with_suffix(".sha256")
 
 
-def _is_whole(library: Path) -> bool:
-    """Whether a library is there and undamaged: loading a torn one would end the process."""
+def _is_intact(library: Path) -> bool:
+    """Whether a library exists undamaged: loading a damaged one would end the process."""
     if not (library.exists() and _seal(library).exists()):
         return False
     return hashlib.sha256(library.read_bytes()).hexdigest() == _seal(library).read_text(encoding="utf-8")
@@ -332,5 +315,5 @@ def _compile(compiler: str, source: str) -> bytes:
         code, library = Path(folder) / "function.c", Path(folder) / "function.so"
         code.write_text(source, encoding="utf-8")
         command = [compiler, *_FLAGS, "-o", str(library), str(code), "-lm"]
-        subprocess.run(command, check=True, capture_output=True, timeout=_PATIENCE)
+        subprocess.run(command, check=True, capture_output=True, timeout=_COMPILER_TIMEOUT)
         return library.read_bytes()

@@ -23,7 +23,7 @@ from rich.table import Table
 
 from motion_cueing.baselines import make_policy
 from motion_cueing.baselines.mpc import Margins, MpcParameters
-from motion_cueing.baselines.mpc.prediction import Linearized
+from motion_cueing.baselines.mpc.prediction import MachineModel
 from motion_cueing.baselines.registry import DESCRIPTIONS
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
@@ -61,7 +61,7 @@ def steps(name: str) -> np.ndarray:
 def derivatives(compile: bool) -> float:
     """Seconds of one evaluation of the machine's derivatives at all nodes."""
     n = len(MpcParameters().nodes)
-    linearized = Linearized(get_platform("paper"), n, Margins(), compile=compile)
+    linearized = MachineModel(get_platform("paper"), n, Margins(), compile=compile)
     motion = 0.1 * np.random.default_rng(0).normal(size=(3, n, 9))
     began = time.thread_time()
     for _ in range(200):

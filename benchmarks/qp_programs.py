@@ -9,17 +9,17 @@ import numpy as np
 from scipy import sparse
 
 from motion_cueing.baselines.mpc import MpcParameters, load_mpc
-from motion_cueing.baselines.mpc.policy import make_controller
+from motion_cueing.baselines.mpc.policy import PredictiveController
 from motion_cueing.baselines.mpc.prediction import (
     N_CUES,
     Grid,
     Linearization,
-    Linearized,
+    MachineModel,
     cue_scales,
     make_grid,
 )
-from motion_cueing.baselines.mpc.problem import Bounds, Plan, Problem, Quadratic
-from motion_cueing.baselines.mpc.solver import Planned, Planner
+from motion_cueing.baselines.mpc.problem import Bounds, HorizonProgram, Motion, QuadraticCost
+from motion_cueing.baselines.mpc.solver import Plan, Planner
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import rollout
@@ -32,12 +32,12 @@ class Program:
     ``active`` are the rows that held in the plan before.
     """
 
-    problem: Problem
-    cost: Quadratic
+    problem: HorizonProgram
+    cost: QuadraticCost
     about: Linearization
     bounds: Bounds
-    plan: Plan
-    wanted: np.ndarray
+    plan: Motion
+    reference_cue: np.ndarray
     active: np.ndarray
 
 
@@ -60,9 +60,9 @@ def collect(maneuvers: tuple[str, ...], each: int) -> list[Program]:
     platform, parameters = get_platform("paper"), load_mpc("mpc-preview")
     kept: list[tuple[Any, ...]] = []
     planner = _Recorder(platform, parameters, kept)
-    policy = make_controller(platform, parameters, planner, "mpc-preview")
     for name in maneuvers:
-        rollout(policy, get_maneuver(name).drive(), platform)
+        cues = get_maneuver(name).drive()
+        rollout(PredictiveController(platform, parameters, "mpc-preview", planner, cues), cues, platform)
     return [_program(parameters, *arguments) for arguments in kept[::each]]
 
 
@@ -71,23 +71,23 @@ class _Recorder(Planner):
         super().__init__(platform, parameters)
         self._kept = kept
 
-    def __call__(self, *arguments: Any) -> Planned:
+    def __call__(self, *arguments: Any) -> Plan:
         self._kept.append(arguments)
         return super().__call__(*arguments)
 
 
 def _program(
-    parameters: MpcParameters, position: Any, rate: Any, wanted: Any, guess: Any, active: Any, sensed: Any
+    parameters: MpcParameters, position: Any, rate: Any, reference: Any, guess: Any, active: Any, sensed: Any
 ) -> Program:
     platform = get_platform("paper")
     grid = make_grid(parameters.nodes)
-    linearized = Linearized(platform, len(grid.times), parameters.margins)
-    problem = Problem(platform, parameters, grid)
-    plan = Plan(*grid.motion(position, rate, guess), guess)
+    linearized = MachineModel(platform, len(grid.times), parameters.margins)
+    problem = HorizonProgram(platform, parameters, grid)
+    plan = Motion(*grid.motion(position, rate, guess), guess)
     about = linearized(plan.position, plan.rate, plan.acceleration)
-    bounds = problem.bounds(linearized.lower, linearized.upper, wanted)
-    cost = problem.cost(plan, about, wanted, sensed)
-    return Program(problem, cost, about, bounds, plan, wanted, active)
+    bounds = problem.bounds(linearized.lower, linearized.upper, reference)
+    cost = problem.cost(plan, about, reference, sensed)
+    return Program(problem, cost, about, bounds, plan, reference, active)
 
 
 def condensed(program: Program) -> Matrices:
@@ -131,7 +131,7 @@ def with_states(program: Program) -> Matrices:
     )
 
 
-def _motion(problem: Problem, n: int, k: int) -> np.ndarray:
+def _motion(problem: HorizonProgram, n: int, k: int) -> np.ndarray:
     """Weights of the motion on [q, v, a] node by node."""
     whole = np.zeros((n, 3, k, n, 3, k))
     for axis, terms in enumerate(problem.motion_weights):

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from motion_cueing.baselines.washout import load_washout
 from motion_cueing.baselines.washout.batch import WashoutBatch
-from motion_cueing.baselines.washout.parameters import load_washout
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.maneuvers.registry import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform

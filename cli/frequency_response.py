@@ -148,11 +148,11 @@ def _line_up(
 
 
 def _testable(name: str, platform: Platform) -> AnyPolicy:
-    from ..baselines.washout.families import CeilingWashout
+    from ..baselines.washout import PerManeuverWashout
     from ..evaluation.policies import make_policy
 
     policy = make_policy(name, platform)
-    if isinstance(policy, CeilingWashout):
+    if isinstance(policy, PerManeuverWashout):
         raise ConfigurationError(
             f"{name} has a set for each standard maneuver and none for sinusoids, so it has no frequency "
             "response; use classical-tuned, or the .yaml file of one set"

@@ -14,9 +14,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 from ..baselines.tuning.search import Status
-from ..baselines.washout.families import ALGORITHMS, AnyWashout, algorithm_of, load_of
+from ..baselines.washout.families import FAMILIES, AnyWashout, algorithm_of, load_of
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.errors import ConfigurationError, DataError
 from ..envs.settings import to_dict
 from ..envs.storage import check_file, write_text
 from ..evaluation.selection import find_car, find_maneuvers, find_platform
@@ -97,7 +97,7 @@ class TuneCommand:
     --policy FILE`. Ctrl-C stops after the generation at hand; --resume goes on.
     """
 
-    algorithm: Positional[Annotated[str, arg(metavar="|".join(ALGORITHMS))]]
+    algorithm: Positional[Annotated[str, arg(metavar="|".join(FAMILIES))]]
     """What to tune."""
     objective: Literal["J", "perceived"] = "J"
     """What to minimize: J, or J of what the driver senses."""
@@ -137,7 +137,7 @@ def run(command: TuneCommand) -> int:
     Raises:
         MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
     """
-    look_up("algorithm", command.algorithm, ALGORITHMS)
+    FAMILIES[command.algorithm]  # refuses unknown ones
     command = replace(command, out=_out(command))
     _check(command)
     record = _record(command)
@@ -157,7 +157,7 @@ def run(command: TuneCommand) -> int:
 
 
 def _out(command: TuneCommand) -> Path:
-    return command.out or Path(f"my-{ALGORITHMS[command.algorithm].start}.yaml")
+    return command.out or Path(f"my-{FAMILIES[command.algorithm].start}.yaml")
 
 
 def _check(command: TuneCommand) -> None:
@@ -219,7 +219,7 @@ def _options(command: TuneCommand) -> TuningOptions:
 
     given = {name: getattr(command, name) for name in ("drives", "budget", "seed")}
     return TuningOptions(
-        start=load_of(command.algorithm, command.start or ALGORITHMS[command.algorithm].start),
+        start=load_of(command.algorithm, command.start or FAMILIES[command.algorithm].start),
         objective=command.objective,
         method=command.method,
         limits=command.limits,
@@ -305,7 +305,7 @@ def _held_out(search: Search) -> Objective:
 
 
 def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
-    found = objective.judge([start, tuned])
+    found = objective.evaluate([start, tuned])
     return [
         f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "
         f"{100.0 * found.at_limit[i]:.3f} % of the time at a limit, "

@@ -71,7 +71,7 @@ def test_the_wheel_holds_every_file_of_the_packages_and_no_other(wheel):
     "name",
     [
         "envs/py.typed",
-        "baselines/washout/presets/est1.yaml",
+        "baselines/washout/classical/presets/est1.yaml",
         "envs/maneuvers/recorded/city-drive/cues.csv.gz",
         "envs/maneuvers/recorded/city-drive/NOTICE.md",
         "envs/maneuvers/recorded/commute/NOTICE.md",

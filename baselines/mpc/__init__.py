@@ -1,28 +1,27 @@
-"""Model predictive control of the nine axes, linear and nonlinear."""
+"""Model predictive control of the nine axes, linear or nonlinear, with or without preview of the drive."""
 
 from .parameters import (
     AxisWeights,
     Forecast,
     Margins,
     MpcParameters,
-    NmpcParameters,
     TiltRate,
     Weights,
     load_mpc,
     mpc_presets,
 )
-from .policy import make_mpc, make_nmpc
+from .policy import PredictiveController, PreviewController, make_mpc
 
 __all__ = [
     "AxisWeights",
     "Forecast",
     "Margins",
     "MpcParameters",
-    "NmpcParameters",
+    "PredictiveController",
+    "PreviewController",
     "TiltRate",
     "Weights",
     "load_mpc",
     "make_mpc",
-    "make_nmpc",
     "mpc_presets",
 ]

@@ -1,4 +1,10 @@
-"""Braking to a stop: what a controller does without a plan."""
+"""Model predictive control as a policy: a new plan over the horizon at every step.
+
+1. Read the state of the machine and the reference cue from the observation (:func:`read_measurement`).
+2. Update the sustained cue and the vestibular filters (:class:`Memory`).
+3. Forecast the reference cue, linearize about the last plan, solve (:class:`.solver.Planner`).
+4. Do the mean acceleration of the plan over the next time step. Without a plan, brake (:class:`Brakes`).
+"""
 
 from __future__ import annotations
 
@@ -10,31 +16,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...envs.cues import CueTrace
+from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from ...envs.simulator.kernels.observation import read
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
 from ..policy import Array, checked_episode_start, checked_observation, wrong_state
 from ..symbolic import SymbolicMachine, cs
-from .parameters import MpcParameters, NmpcParameters
+from .parameters import MpcParameters
 from .prediction import REST, Floats, Forecaster
 from .problem import moving_axes
-from .solver import OneThread, Planned, Planner, Rows
+from .solver import Plan, Planner, Rows
 
-_ROUNDS: Final = 3
+try:
+    from threadpoolctl import ThreadpoolController
+except ImportError:
+    raise ConfigurationError(
+        "this controller needs threadpoolctl, which is not installed: "
+        "pip install 'motion-cueing-gym[optimal]'"
+    ) from None
+
+_NEWTON_STEPS: Final = 3
 """Newton's steps to the platform's accelerations; each squares the error."""
 
-_LEAST: Final = 1e-3
-"""Of the Jacobian's singular values, relative to the largest: directions in which legs move less are left."""
+_LEAST_SINGULAR_VALUE: Final = 1e-3
+"""Of the Jacobian, relative to the largest: directions in which legs move less are not corrected."""
 
-_SHARE: Final = 1.0 - 1e-6
-"""Of the acceleration limits, so that rounding does not exceed them."""
+_BRAKING: Final = 1.0 - 1e-6
+"""Share of the acceleration limits to brake with, so that rounding does not exceed them."""
+
+_RELAXED: Final = 1e-3
+"""Violation of a linearized limit from which on a plan counts as relaxed, share of half its range."""
 
 
 class Brakes:
-    """Accelerations that bring every actuator to rest by itself, as fast as its acceleration limit lets it.
+    """Emergency braking: every actuator comes to rest by itself, as fast as its acceleration limit allows.
 
-    So each leg stops where its own limits say it can; the platform's accelerations are those that give
-    the legs their rates at the end of the step.
+    So each leg stops where its own limits say it can. The platform's accelerations follow from the leg rates
+    at the end of the step, by Newton's method.
     """
 
     def __init__(self, platform: Platform) -> None:
@@ -43,7 +61,7 @@ class Brakes:
         after = machine.leg_rates(q + TIME_STEP * v + 0.5 * TIME_STEP**2 * a, v + TIME_STEP * a)
         self._after = cs.Function("after", [q, v, a], [after, cs.jacobian(after, a[2:8])])
         self._rates = machine.leg_rates
-        self._change = _SHARE * TIME_STEP * machine.limits["acceleration"]
+        self._change = _BRAKING * TIME_STEP * machine.limits["acceleration"]
         self._moving = np.isin(np.arange(N_AXES), moving_axes(platform))
 
     def __call__(self, position: Floats, rate: Floats) -> Floats:
@@ -58,23 +76,18 @@ class Brakes:
         reference = actuators - np.clip(actuators, -self._change, self._change)
         action = (reference - actuators) / TIME_STEP
         action[2:8] = 0.0
-        for _ in range(_ROUNDS):
+        for _ in range(_NEWTON_STEPS):
             after, slope = (np.asarray(part) for part in self._after(position, rate, action))
             # Least squares: near a singular pose no accelerations give the legs all of their rates.
-            action[2:8] += np.linalg.lstsq(slope, reference[2:8] - after[:, 0], rcond=_LEAST)[0]
+            action[2:8] += np.linalg.lstsq(slope, reference[2:8] - after[:, 0], rcond=_LEAST_SINGULAR_VALUE)[
+                0
+            ]
         return np.asarray(np.where(self._moving, action, 0.0))
 
 
-# What a predictive controller sees, remembers and counts.
-
-
-_RELAXED: Final = 1e-3
-"""Violation of a linearized limit from which on a plan counts as relaxed, share of half its range."""
-
-
 @dataclass(frozen=True)
-class Moment:
-    """What a controller sees: positions and rates (9,), the car's cues and the cues' error (6,), SI."""
+class Measurement:
+    """Measured positions and rates (9,), reference cue and cue error (6,), SI."""
 
     position: Floats
     rate: Floats
@@ -82,12 +95,12 @@ class Moment:
     error: Floats
 
 
-def moment_of(row: NDArray[Any], angle: float) -> Moment:
-    """What an observation says.
+def read_measurement(row: NDArray[Any], angle: float) -> Measurement:
+    """The measurement in an observation.
 
     Args:
         row: (OBSERVATION_SIZE,) of one machine.
-        angle: Of the turntable a time step ago; the one measured is the nearest to it, rad.
+        angle: Unwound angle of the turntable a time step ago, rad; the measured one is taken nearest to it.
     """
     sine, cosine = read(row, "turntable")
     measured = float(np.arctan2(sine, cosine))
@@ -97,23 +110,24 @@ def moment_of(row: NDArray[Any], angle: float) -> Moment:
     reference = np.concatenate([read(row, "reference_force"), read(row, "reference_rate")])
     simulated = np.concatenate([read(row, "simulator_force"), read(row, "simulator_rate")])
     # Observed forces have gravity at rest taken off.
-    return Moment(np.concatenate(position), np.concatenate(rate), reference + REST, simulated - reference)
+    error = simulated - reference
+    return Measurement(np.concatenate(position), np.concatenate(rate), reference + REST, error)
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What a controller knows of one machine.
+    """State of the controller of one machine.
 
     Args:
-        sample: Of the drive, counted from the start.
+        sample: Number of the sample, from the start of the drive.
         angle: Turntable angle, unwound, rad.
-        plan: (n, 9) accelerations at the nodes when it was made.
+        plan: (n, 9) accelerations at the nodes when the plan was made.
         age: Time steps since.
         solved: Whether there is a plan.
         active: Limits that held in it.
-        error: (6,) of the cues in the last step.
-        lasts: (6,) what of the car's cues lasts; None at the start.
-        sensors: (6, 3) states of the vestibular filters.
+        error: (6,) cue error in the last step.
+        sustained: (6,) sustained part of the reference cue; None at the start.
+        vestibular: (6, 3) states of the vestibular filters.
     """
 
     sample: int
@@ -123,20 +137,20 @@ class Memory:
     solved: bool
     active: Rows
     error: Floats
-    lasts: Floats | None
-    sensors: Floats
+    sustained: Floats | None
+    vestibular: Floats
 
 
 @dataclass
 class Counts:
-    """What a controller counted.
+    """Statistics of a drive.
 
     Args:
         solves: Plans made.
-        failures: Plans that were not found; the machine braked.
-        iterations: Programs solved for them.
-        rounds: Duals solved for them.
-        unconverged: Plans still on the move after their last program, where there may be several.
+        failures: Plans without a solution; the machine braked.
+        iterations: Quadratic programs solved.
+        rounds: Dual programs solved.
+        unconverged: Nonlinear plans that did not converge.
         relaxed: Plans in which a linearized limit could not be kept.
     """
 
@@ -147,28 +161,24 @@ class Counts:
     unconverged: int = 0
     relaxed: int = 0
 
-    def add(self, planned: Planned) -> None:
-        """One more."""
+    def add(self, plan: Plan) -> None:
+        """Count a plan."""
         self.solves += 1
-        self.failures += not planned.solved
-        self.iterations += planned.iterations
-        self.rounds += planned.rounds
-        self.unconverged += not planned.converged
-        self.relaxed += planned.relaxed > _RELAXED
-
-
-# Model predictive control as a policy.
+        self.failures += not plan.solved
+        self.iterations += plan.iterations
+        self.rounds += plan.rounds
+        self.unconverged += not plan.converged
+        self.relaxed += plan.relaxed > _RELAXED
 
 
 class PredictiveController:
-    """A policy that makes a plan at every step and does the beginning of it.
+    """Model predictive control, linear or nonlinear.
 
     Args:
         platform: The machine.
         parameters: Of the controller.
-        planner: Makes the plans.
         name: In tables.
-        configuration: For the record, where it is more than ``parameters``.
+        planner: Of the same machine and parameters, to share it among drives; default: a new one.
         cues: The drive, where some of it is known.
     """
 
@@ -176,22 +186,22 @@ class PredictiveController:
         self,
         platform: Platform,
         parameters: MpcParameters,
-        planner: Planner,
-        name: str,
-        configuration: Any = None,
+        name: str = "mpc",
+        planner: Planner | None = None,
         cues: CueTrace | None = None,
     ) -> None:
-        self.name, self.dt = name, TIME_STEP
-        self.parameters = configuration or parameters
-        self._mpc, self._planner = parameters, planner
-        self._forecast = Forecaster(planner.grid, parameters.forecast, cues)
+        self.name, self.dt, self.parameters = name, TIME_STEP, parameters
+        self._planner = planner or Planner(platform, parameters)
+        self._forecast = Forecaster(self._planner.grid, parameters.forecast, cues)
         self._brakes = Brakes(platform)
         self._counts = Counts()
-        self._one_thread = OneThread()
+        # BLAS shares a product among all cores. For matrices of this size that gains nothing on an idle
+        # machine, and on a busy one the threads wait for each other: 130 ms instead of 1 ms was measured.
+        self._blas: Any = ThreadpoolController()
 
     @property
     def notes(self) -> Mapping[str, str]:
-        """What was counted so far, for a trajectory's metadata."""
+        """Statistics of the drive so far, for a trajectory's metadata."""
         return {f"mpc_{name}": str(value) for name, value in vars(self._counts).items()}
 
     def predict(
@@ -208,69 +218,70 @@ class PredictiveController:
         """
         observation = np.asarray(checked_observation(observation), dtype=np.float64)
         rows = np.atleast_2d(observation)
-        known = _checked_state(state, len(rows))
+        memories = _checked_state(state, len(rows))
         begins = np.zeros(len(rows), dtype=np.bool_)
         if episode_start is not None:
             begins = checked_episode_start(episode_start, len(rows))
         if begins.all():
             self._counts = Counts()
-        with self._one_thread():
+        with self._blas.limit(limits=1, user_api="blas"):
             answers = [
                 self._act(row, None if begin else memory)
-                for row, begin, memory in zip(rows, begins, known, strict=True)
+                for row, begin, memory in zip(rows, begins, memories, strict=True)
             ]
         actions = np.array([action for action, _ in answers]).reshape(*observation.shape[:-1], N_AXES)
         return actions, [memory for _, memory in answers]
 
     def _act(self, row: NDArray[Any], memory: Memory | None) -> tuple[Floats, Memory]:
-        memory = self._begun() if memory is None else memory
-        moment = moment_of(row, memory.angle)
-        sensors = self._planner.perception.advance(memory.sensors, memory.error, moment.error)
-        lasts = self._forecast.remember(memory.lasts, moment.reference)
-        memory = replace(memory, angle=moment.position[8], sensors=sensors, error=moment.error, lasts=lasts)
-        if memory.age >= self._mpc.every or not memory.solved:
-            memory = self._plan(moment, memory, lasts)
-        action = self._action(moment, memory)
-        return action, replace(memory, sample=memory.sample + 1, age=memory.age + 1)
-
-    def _begun(self) -> Memory:
-        n = len(self._planner.grid.times)
-        return Memory(
+        memory = memory or Memory(
             sample=0,
             angle=0.0,
-            plan=np.zeros((n, N_AXES)),
+            plan=np.zeros((len(self._planner.grid.times), N_AXES)),
             age=0,
             solved=False,
             active=np.zeros(0, dtype=np.intp),
             error=np.zeros(6),
-            lasts=None,
-            sensors=self._planner.perception.start(),
+            sustained=None,
+            vestibular=self._planner.perceived.start(),
         )
+        measured = read_measurement(row, memory.angle)
+        sustained = self._forecast.update(memory.sustained, measured.reference)
+        memory = replace(
+            memory,
+            angle=measured.position[8],
+            vestibular=self._planner.perceived.advance(memory.vestibular, memory.error, measured.error),
+            error=measured.error,
+            sustained=sustained,
+        )
+        if memory.age >= self.parameters.every or not memory.solved:
+            memory = self._plan(measured, memory, sustained)
+        action = self._action(measured, memory)
+        return action, replace(memory, sample=memory.sample + 1, age=memory.age + 1)
 
-    def _plan(self, moment: Moment, memory: Memory, lasts: Floats) -> Memory:
+    def _plan(self, measured: Measurement, memory: Memory, sustained: Floats) -> Memory:
         grid = self._planner.grid
-        planned = self._planner(
-            moment.position,
-            moment.rate,
-            self._forecast(moment.reference, lasts, memory.sample),
+        plan = self._planner(
+            measured.position,
+            measured.rate,
+            self._forecast(measured.reference, sustained, memory.sample),
             grid.at(memory.plan, grid.times + TIME_STEP * memory.age),
             memory.active,
-            self._planner.perception.memory(memory.sensors, moment.error),
+            self._planner.perceived.free_response(memory.vestibular, measured.error),
         )
-        self._counts.add(planned)
-        plan = planned.plan.acceleration if planned.solved else np.zeros_like(memory.plan)
-        return replace(memory, plan=plan, age=0, solved=planned.solved, active=planned.active)
+        self._counts.add(plan)
+        acceleration = plan.motion.acceleration if plan.solved else np.zeros_like(memory.plan)
+        return replace(memory, plan=acceleration, age=0, solved=plan.solved, active=plan.active)
 
-    def _action(self, moment: Moment, memory: Memory) -> Floats:
+    def _action(self, measured: Measurement, memory: Memory) -> Floats:
         """The mean acceleration of the plan over the next time step; braking without a plan."""
         if not memory.solved:
-            return self._brakes(moment.position, moment.rate)
+            return self._brakes(measured.position, measured.rate)
         middle = TIME_STEP * (memory.age + 0.5)
         return np.asarray(self._planner.grid.at(memory.plan, np.array([middle]))[0])
 
 
 def _checked_state(state: Any, n: int) -> list[Memory] | list[None]:
-    """What is known of n machines."""
+    """The memories of n machines."""
     if state is None:
         return [None] * n
     if not isinstance(state, list) or len(state) != n or not all(isinstance(s, Memory) for s in state):
@@ -279,27 +290,17 @@ def _checked_state(state: Any, n: int) -> list[Memory] | list[None]:
 
 
 class PreviewController:
-    """A predictive controller that is told the drive, and looks ahead as far as its preview goes.
+    """Model predictive control with preview: it needs the drive before it begins.
 
     Args:
         platform: The machine.
         parameters: Of the controller.
-        planner: Makes the plans.
         name: In tables.
-        configuration: For the record, where it is more than ``parameters``.
     """
 
-    def __init__(
-        self,
-        platform: Platform,
-        parameters: MpcParameters,
-        planner: Planner,
-        name: str,
-        configuration: Any = None,
-    ) -> None:
-        self.name, self.dt = name, TIME_STEP
-        self.parameters = configuration or parameters
-        self._platform, self._mpc, self._planner = platform, parameters, planner
+    def __init__(self, platform: Platform, parameters: MpcParameters, name: str = "mpc-preview") -> None:
+        self.name, self.dt, self.parameters = name, TIME_STEP, parameters
+        self._platform, self._planner = platform, Planner(platform, parameters)
 
     def for_drive(self, cues: CueTrace) -> PredictiveController:
         """The policy for one drive.
@@ -307,51 +308,19 @@ class PreviewController:
         Args:
             cues: The drive, at the machine's time step.
         """
-        return PredictiveController(
-            self._platform, self._mpc, self._planner, self.name, self.parameters, cues
-        )
-
-
-def make_controller(
-    platform: Platform, parameters: MpcParameters, planner: Planner, name: str, configuration: Any = None
-) -> PredictiveController | PreviewController:
-    """The policy with or without preview; arguments as of :class:`PreviewController`."""
-    kind = PreviewController if parameters.forecast.preview > 0.0 else PredictiveController
-    return kind(platform, parameters, planner, name, configuration)
+        return PredictiveController(self._platform, self.parameters, self.name, self._planner, cues)
 
 
 def make_mpc(
     platform: Platform, parameters: MpcParameters | None = None, name: str = "mpc"
 ) -> PredictiveController | PreviewController:
-    """Linear time-varying predictive control: the machine is linearized once a plan, about the last plan.
+    """Model predictive control for a machine, with preview where the parameters have one.
 
     Args:
         platform: The machine.
-        parameters: Of the controller; default: without preview.
+        parameters: Of the controller; default: linear, without preview.
         name: In tables.
     """
     parameters = parameters or MpcParameters()
-    return make_controller(platform, parameters, Planner(platform, parameters), name)
-
-
-# Nonlinear model predictive control: each plan is the solution of the nonlinear program.
-#
-# The machine's nine axes are double integrators, so shooting from node to node is exact whatever the
-# accelerations, and the states are eliminated. What is nonlinear are the cues (rotating frames) and the
-# legs; sequential quadratic programming linearizes them again about each new plan until it no longer
-# changes, with a search along each change that takes the exact cost and the exact limits.
-
-
-def make_nmpc(
-    platform: Platform, parameters: NmpcParameters | None = None, name: str = "nmpc"
-) -> PredictiveController | PreviewController:
-    """Nonlinear predictive control.
-
-    Args:
-        platform: The machine.
-        parameters: Of the controller; default: without preview.
-        name: In tables.
-    """
-    parameters = parameters or NmpcParameters()
-    planner = Planner(platform, parameters.mpc, parameters.iterations, parameters.tolerance)
-    return make_controller(platform, parameters.mpc, planner, name, parameters)
+    kind = PreviewController if parameters.forecast.preview > 0.0 else PredictiveController
+    return kind(platform, parameters, name)

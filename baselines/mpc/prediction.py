@@ -1,10 +1,29 @@
-"""Accelerations that are straight lines between nodes: the motion they give, exactly.
+r"""Prediction model: motion, cues and limits, reference cue and perceived error at the nodes of the horizon.
 
-On an interval of length h from a_0 to a_1 a double integrator goes to
+**Motion.** Every axis is a double integrator, and its acceleration is a straight line between nodes. On an
+interval of length h from a_0 to a_1 it goes exactly to
 
-    v_1 = v_0 + h (a_0 + a_1) / 2,    q_1 = q_0 + h v_0 + h^2 (2 a_0 + a_1) / 6,
+    v_1 = v_0 + h (a_0 + a_1) / 2,    q_1 = q_0 + h v_0 + h^2 (2 a_0 + a_1) / 6.
 
-and before the first node the acceleration is constant. All nine axes share these maps.
+Before the first node the acceleration is constant. So positions and rates at the nodes are linear in the
+accelerations there, q = q_0 + t v_0 + Q a and v = v_0 + V a, and all nine axes share Q and V (:class:`Grid`).
+
+**Cues and limits.** One CasADi function gives values and derivatives of all rows at all nodes
+(:class:`MachineModel`): the cues f_SS and omega_SS in indifference zones, and for each actuator at q with
+rate v its stopping place, its rate and its acceleration, as shares of their ranges. The stopping place is
+
+    q + v |v| / (2 A).
+
+It lies within the travel exactly if the actuator can brake in time: v^2 + 2 (q_max - q) a_min <= 0.
+
+**Reference cue.** Known for the preview. Beyond it the cue u is extrapolated in two parts, the sustained one
+m (a low-pass of u) and the transient one u - m (:class:`Forecaster`):
+
+    u(t) = rest + (m_0 - rest) exp(-t / lasting) + (u_0 - m_0) exp(-t / decay).
+
+**Perceived error.** Canals and otoliths are linear, so the perceived error is the error filtered. For an
+error that is a straight line between nodes, both the response at the nodes and the effect of the filters'
+states are matrices (:class:`PerceivedError`).
 """
 
 from __future__ import annotations
@@ -31,13 +50,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes and what they make of accelerations; n nodes.
+    """The n nodes of the horizon and their integration matrices.
 
     Args:
         times: (n,) from now, s.
-        position: (n, n) from accelerations at the nodes to positions there.
-        rate: (n, n) to rates.
-        weights: (n,) of each node in a mean over the horizon, by the trapezoidal rule; their sum is 1.
+        position: (n, n) Q, from accelerations at the nodes to positions there.
+        rate: (n, n) V, to rates there.
+        weights: (n,) weight of each node in a mean over the horizon, by the trapezoidal rule; their sum is 1.
     """
 
     times: Floats
@@ -57,7 +76,7 @@ class Grid:
         return free + self.position @ accelerations, rate + self.rate @ accelerations
 
     def at(self, accelerations: Floats, times: Floats) -> Floats:
-        """Accelerations (m, k) of a plan at other times; constant before the first and after the last node.
+        """Accelerations (m, k) at other times; constant before the first and after the last node.
 
         Args:
             accelerations: (n, k) at the nodes.
@@ -69,10 +88,10 @@ class Grid:
         return np.asarray((1.0 - share) * accelerations[j] + share * accelerations[j + 1])
 
     def averages(self, dt: float) -> Floats:
-        """(n, m) from samples at dt, 2 dt ... to the horizon to one value a node.
+        """(n, m) matrix from samples at dt, 2 dt ... to the horizon to one value a node.
 
-        Each node takes the mean under its hat, the line that is 1 there and 0 at its neighbors, so that
-        nothing between two nodes is overlooked. The first takes the sample at its own time.
+        Each node takes the mean under its hat function, which is 1 there and 0 at its neighbors. So no
+        sample between two nodes is lost. The first node takes the sample at its own time.
         """
         count = max(round(self.times[-1] / dt), 1)
         samples = dt * np.arange(1, count + 1)
@@ -101,22 +120,12 @@ def make_grid(nodes: tuple[float, ...]) -> Grid:
     return Grid(times, position, rate, weights / weights.sum())
 
 
-# The machine about a plan, to first order: cues, and how near every actuator is to its limits.
-#
-# One CasADi function gives, for every node at once, values and derivatives of
-#
-# - the cues f_SS and omega_SS in zones of J;
-# - for each actuator at q with rate v the place where it could stop, q + v|v| / (2 A), its rate and its
-#   acceleration, as shares of their ranges. That the place lies within the travel is the constraint
-#   v^2 + 2 (q_max - q) a_min <= 0 for both ends, and without one it is a position limit at rest.
-
-
 N_CUES: Final = 6
 
 
 @dataclass(frozen=True)
 class Linearization:
-    """Values and derivatives at n nodes, k rows each: the cues, then the limits.
+    """Values and first derivatives of k rows at n nodes: the cues, then the limits.
 
     Args:
         values: (n, k).
@@ -126,13 +135,13 @@ class Linearization:
     values: Floats
     slopes: Floats
 
-    def ahead(self, moved: Floats) -> Floats:
-        """(n, k) values after a small change (n, 27) of positions, rates and accelerations."""
-        return np.asarray(self.values + (self.slopes @ moved[:, :, None])[:, :, 0])
+    def at(self, change: Floats) -> Floats:
+        """(n, k) values, to first order, after a change (n, 27) of positions, rates and accelerations."""
+        return np.asarray(self.values + (self.slopes @ change[:, :, None])[:, :, 0])
 
 
-class Linearized:
-    """The function for a machine and a number of nodes; its results are overwritten by the next call.
+class MachineModel:
+    """Linearization of cues and limits at n nodes; its results are overwritten by the next call.
 
     Args:
         platform: The machine.
@@ -149,7 +158,8 @@ class Linearized:
         machine = SymbolicMachine(platform)
         q, v, a = (cs.SX.sym(name, N_AXES) for name in ("q", "v", "a"))
         limits, self.lower, self.upper = _limit_rows(machine, margins, q, v, a)
-        rows = cs.vertcat(_cue_rows(machine, q, v, a), limits)
+        force, rate = machine.cues(q, v, a)
+        rows = cs.vertcat(force / CueCost().force, rate / CueCost().rate, limits)
         slopes = cs.jacobian(rows, cs.vertcat(q, v, a))
         outputs = [rows, cs.densify(cs.vec(slopes.T))]
         node = cs.Function("linearized", [q, v, a], outputs).map(nodes)
@@ -170,23 +180,15 @@ class Linearized:
         return self._result
 
 
-def _cue_rows(machine: SymbolicMachine, q: Expression, v: Expression, a: Expression) -> Expression:
-    """(6,) cues in zones."""
-    zone = CueCost()
-    force, rate = machine.cues(q, v, a)
-    return cs.vertcat(force / zone.force, rate / zone.rate)
-
-
 def cue_scales() -> Floats:
-    """(6,) what one unit of the cue rows is, m/s^2 and rad/s."""
-    zone = CueCost()
-    return np.repeat([zone.force, zone.rate], 3)
+    """(6,) indifference zones of J, the units of the cue rows, m/s^2 and rad/s."""
+    return np.repeat([CueCost().force, CueCost().rate], 3)
 
 
 def _limit_rows(
     machine: SymbolicMachine, margins: Margins, q: Expression, v: Expression, a: Expression
 ) -> tuple[Expression, Floats, Floats]:
-    """Stopping places, rates and accelerations of the actuators there are, with their bounds."""
+    """Stopping places, rates and accelerations of the machine's actuators, with their bounds."""
     limits, legs = machine.limits, machine.leg_motion(q, v, a)
     place = cs.vertcat(q[:2], legs.extension, q[8])
     rate = cs.vertcat(v[:2], legs.rate, v[8])
@@ -209,24 +211,16 @@ def _limit_rows(
     return cs.vertcat(*(row for row, _ in rows)), lower, upper
 
 
-# The car's cues over the horizon: known, or guessed.
-
-
 REST: Final = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
 """Specific force and angular velocity at rest on level ground."""
 
 
 class Forecaster:
-    """Gives the cues at the nodes of a grid.
-
-    What is not known goes on from the last that is, in two parts: what lasts, the low-pass m of the cues
-    u so far, and what is new,
-
-        u(t) = rest + (m_0 - rest) exp(-t / lasting) + (u_0 - m_0) exp(-t / decay).
+    """Forecast of the reference cue at the nodes of a grid.
 
     Args:
         grid: The nodes.
-        forecast: What is known.
+        forecast: Preview and time constants.
         cues: The drive, where some of it is known.
     """
 
@@ -235,15 +229,17 @@ class Forecaster:
         count = averages.shape[1]
         known = min(round(forecast.preview / TIME_STEP), count) if cues is not None else 0
         self._gain = 1.0 - np.exp(-TIME_STEP / forecast.memory)
-        self._known, self._guessed = averages[:, :known], averages[:, known:]
-        after = TIME_STEP * np.arange(1, count - known + 1)[:, None]
-        constants = np.array([*forecast.force_decay, *[forecast.rate_decay] * 3])
-        self._new = self._guessed @ np.exp(-after / constants)  # (n, 6)
-        self._lasting = self._guessed @ np.exp(-after / forecast.lasting_decay)  # (n, 1)
-        self._level = self._guessed.sum(axis=1, keepdims=True)
+        self._known, beyond = averages[:, :known], averages[:, known:]
+        times = TIME_STEP * np.arange(1, count - known + 1)[:, None]
+        decays = np.array([*forecast.force_decay, *[forecast.rate_decay] * 3])
+        self._transient = beyond @ np.exp(-times / decays)  # (n, 6)
+        self._sustained = beyond @ np.exp(-times / forecast.lasting_decay)  # (n, 1)
+        self._rest = beyond.sum(axis=1, keepdims=True)  # (n, 1)
         if cues is not None:
-            self._drive = _padded(cues, known)
-            self._lasts = lfilter(
+            # After its end a drive holds its last cue.
+            drive = np.hstack([cues.specific_force, cues.angular_velocity])
+            self._drive = np.concatenate([drive, np.repeat(drive[-1:], known, axis=0)])
+            self._drive_sustained = lfilter(
                 [self._gain],
                 [1.0, self._gain - 1.0],
                 self._drive,
@@ -251,40 +247,30 @@ class Forecaster:
                 zi=(1.0 - self._gain) * self._drive[:1],
             )[0]
 
-    def remember(self, lasts: Floats | None, now: Floats) -> Floats:
-        """(6,) what lasts, from what lasted a time step ago (None at the start) and the cues now."""
-        return now if lasts is None else lasts + self._gain * (now - lasts)
+    def update(self, sustained: Floats | None, now: Floats) -> Floats:
+        """(6,) sustained cue, from that of a time step ago (None at the start) and the cue now."""
+        return now if sustained is None else sustained + self._gain * (now - sustained)
 
-    def __call__(self, now: Floats, lasts: Floats, sample: int) -> Floats:
-        """(n, 6) cues at the nodes, SI.
+    def __call__(self, now: Floats, sustained: Floats, sample: int) -> Floats:
+        """(n, 6) reference cue at the nodes, SI.
 
         Args:
-            now: (6,) cues at this sample.
-            lasts: (6,) what of them lasts.
-            sample: Its number in the drive.
+            now: (6,) cue at this sample.
+            sustained: (6,) its sustained part.
+            sample: Number of the sample in the drive.
         """
         count = self._known.shape[1]
         if count == 0:
-            return self._guess(now, lasts)
+            return self._extrapolated(now, sustained)
         last = min(sample, len(self._drive) - count - 1) + count
-        ahead = self._drive[last + 1 - count : last + 1]
-        return np.asarray(self._known @ ahead + self._guess(ahead[-1], self._lasts[last]))
+        preview = self._drive[last + 1 - count : last + 1]
+        return np.asarray(
+            self._known @ preview + self._extrapolated(preview[-1], self._drive_sustained[last])
+        )
 
-    def _guess(self, now: Floats, lasts: Floats) -> Floats:
-        return np.asarray(self._level * REST + self._lasting * (lasts - REST) + self._new * (now - lasts))
-
-
-def _padded(cues: CueTrace, count: int) -> Floats:
-    """The cues of a drive (samples + count, 6), its last held after its end."""
-    drive = np.hstack([cues.specific_force, cues.angular_velocity])
-    return np.concatenate([drive, np.repeat(drive[-1:], count, axis=0)])
-
-
-# The perceived error over the horizon: what a vestibular model makes of the error of the cues.
-#
-# Canals and otoliths are linear, so what is sensed of an error is the error filtered. For an error that is
-# a straight line between nodes, the filter's response at the nodes is a matrix, and the memory of what was
-# felt before another.
+    def _extrapolated(self, now: Floats, sustained: Floats) -> Floats:
+        decaying = self._sustained * (sustained - REST)
+        return np.asarray(self._rest * REST + decaying + self._transient * (now - sustained))
 
 
 _ORDER = 3
@@ -302,15 +288,15 @@ class Ramp:
     d: float
 
 
-class Perception:
-    """Filters of the six cues' errors.
+class PerceivedError:
+    """Vestibular filters of the six cues' errors.
 
     Args:
         grid: The nodes.
         parameters: With the objective; for "cab" there is nothing to filter.
 
     Attributes:
-        response: (6, n, n) from errors at the nodes to sensed errors there; None for "cab".
+        response: (6, n, n) from errors at the nodes to perceived errors there; None for "cab".
     """
 
     def __init__(self, grid: Grid, parameters: MpcParameters) -> None:
@@ -322,11 +308,11 @@ class Perception:
         steps = np.diff(grid.times, prepend=0.0)
         over_nodes = [_over(system, steps) for system in systems]
         self.response = np.array([response for response, _ in over_nodes])
-        self._memory = np.array([memory for _, memory in over_nodes])
+        self._free_response = np.array([free for _, free in over_nodes])
         self._steps = [_ramp(system, TIME_STEP) for system in systems]
 
     def start(self) -> Floats:
-        """(6, 3) states of the filters that never felt an error."""
+        """(6, 3) states of the filters before any error."""
         return np.zeros((N_CUES, _ORDER))
 
     def advance(self, state: Floats, before: Floats, now: Floats) -> Floats:
@@ -347,8 +333,8 @@ class Perception:
             ]
         )
 
-    def memory(self, state: Floats, error: Floats) -> Floats | None:
-        """(n, 6) sensed errors at the nodes, in zones, were the error to be 0 from there on; None for "cab".
+    def free_response(self, state: Floats, error: Floats) -> Floats | None:
+        """(n, 6) perceived errors at the nodes, in zones, for an error of 0 at all of them; None for "cab".
 
         Args:
             state: (6, 3) of the filters now.
@@ -357,7 +343,7 @@ class Perception:
         if self.response is None:
             return None
         begin = np.append(state, (error / cue_scales())[:, None], axis=1)
-        return np.asarray(np.einsum("cni,ci->nc", self._memory, begin))
+        return np.asarray(np.einsum("cni,ci->nc", self._free_response, begin))
 
 
 def _system(model: VestibularModel, cue: int) -> tuple[Floats, Floats, Floats, float]:
@@ -370,7 +356,7 @@ def _system(model: VestibularModel, cue: int) -> tuple[Floats, Floats, Floats, f
 
 
 def _ramp(system: tuple[Floats, Floats, Floats, float], h: float) -> Ramp:
-    """A system over an interval of ``h`` seconds."""
+    """A system over an interval of h seconds, by the matrix exponential (van Loan)."""
     a, b, c, d = system
     augmented = np.zeros((_ORDER + 2, _ORDER + 2))
     augmented[:_ORDER, :_ORDER], augmented[:_ORDER, _ORDER] = a * h, b * h
@@ -381,9 +367,9 @@ def _ramp(system: tuple[Floats, Floats, Floats, float], h: float) -> Ramp:
 
 
 def _over(system: tuple[Floats, Floats, Floats, float], steps: Floats) -> tuple[Floats, Floats]:
-    """Response (n, n) to values at the nodes, and (n, 4) to the state and the value now."""
+    """Response (n, n) to errors at the nodes, and free response (n, 4) to the state and the error now."""
     n = len(steps)
-    state = np.hstack([np.eye(_ORDER), np.zeros((_ORDER, n + 1))])  # by state, value now, values at nodes
+    state = np.hstack([np.eye(_ORDER), np.zeros((_ORDER, n + 1))])  # by state, error now, errors at nodes
     out = np.zeros((n, _ORDER + 1 + n))
     for j, h in enumerate(steps):
         ramp = _ramp(system, float(h))

@@ -1,11 +1,15 @@
-"""The quadratic program of a plan: what it costs, and the limits as rows.
+r"""The quadratic program of a plan: motion cueing over the horizon as cost and linear inequalities.
 
-Unknown is the change of the accelerations at the nodes, one column for every axis that moves, flat by
-node. Cost is the mean over the horizon of the squared cue error in zones, as J, and of the motion:
+The unknowns z are the changes of the accelerations at the n nodes, one column for every axis that moves, flat
+by node. About a motion with cues y and their derivatives Y by z, the cost is the mean over the horizon of the
+squared cue error in indifference zones, as J, and of the weighted motion:
 
-    1/2 sum_j w_j ( |y_j - wanted_j|^2 + position, rate and acceleration, weighted ) + end terms
+    min_z  1/2 sum_j w_j ( |y_j + Y_j z - r_j|^2 + |q_j|^2_P + |v_j|^2_R + |a_j|^2_S ) + end terms
+    s.t.   lower_j <= h_j + H_j z <= upper_j  at every node j,
 
-with the cues y linearized. Every limit is a row whose violation has a price, so it always has a solution.
+with r the reference cue, w_j the weights of the trapezoidal rule and h the limit rows. For the perceived
+objective the errors go through the vestibular response first. The Hessian is Gauss-Newton's. The violation of
+every limit has a price, so the program always has a solution.
 """
 
 from __future__ import annotations
@@ -25,7 +29,7 @@ _TILT: slice = slice(3, 5)
 
 
 @dataclass(frozen=True)
-class Plan:
+class Motion:
     """Motion at n nodes, (n, 9) each: positions, rates and accelerations."""
 
     position: Floats
@@ -34,7 +38,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Quadratic:
+class QuadraticCost:
     """1/2 z'Hz + g'z over z (m,) for ``hessian`` (m, m) and ``gradient`` (m,)."""
 
     hessian: Floats
@@ -46,10 +50,10 @@ class Bounds:
     """Bounds of the linearized rows, each (n, k), infinite where there is none.
 
     Args:
-        lower: Least value.
-        upper: Greatest.
-        price: Cost of a violation, per unit; infinite where ``softness`` counts.
-        softness: Reciprocal of the cost of half a violation's square; 0 where ``price`` counts.
+        lower: Least values.
+        upper: Greatest values.
+        price: Linear cost of a violation (exact penalty); infinite where ``softness`` applies.
+        softness: Reciprocal of the quadratic cost of a violation; 0 where ``price`` applies.
     """
 
     lower: Floats
@@ -58,14 +62,14 @@ class Bounds:
     softness: Floats
 
 
-class Problem:
-    """Makes the program of one machine and one set of parameters.
+class HorizonProgram:
+    """Builds the quadratic program for one machine and one set of parameters.
 
     Args:
         platform: The machine.
         parameters: Of the controller.
         grid: Its nodes.
-        perceived: (6, n, n) from the error of each cue at the nodes to that of what is sensed, or None.
+        perceived: (6, n, n) from the error of each cue at the nodes to the perceived error there, or None.
 
     Attributes:
         axes: Axes that move, in the order of ``AXES``.
@@ -91,43 +95,52 @@ class Problem:
         self._regular = hessian.reshape(n * k, n * k)
         self._scale = np.sqrt(grid.weights)[:, None]
 
-    def cost(self, plan: Plan, about: Linearization, reference: Floats, sensed: Floats | None) -> Quadratic:
-        """The cost about a plan.
+    def cost(
+        self, motion: Motion, about: Linearization, reference: Floats, free_response: Floats | None
+    ) -> QuadraticCost:
+        """Cost about a motion.
 
         Args:
-            plan: At the nodes.
-            about: The machine linearized there.
-            reference: (n, 6) the car's cues, SI.
-            sensed: (n, 6) what the sensors' memory adds to the perceived error, in zones; None for none.
+            motion: At the nodes.
+            about: Cues and limits, linearized there.
+            reference: (n, 6) reference cue, SI.
+            free_response: (n, 6) perceived error that past errors leave, in zones; None for none.
         """
         slope = self.condensed(about.slopes[:, :N_CUES])
         if self._perceived is not None:
-            simulated = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
-            slope = np.concatenate([simulated, self._cab_share * slope], axis=1)
-        residual = (self._scale * self._error(about, reference, sensed)).ravel()
+            perceived = np.matmul(self._perceived, slope.transpose(1, 0, 2)).transpose(1, 0, 2)
+            slope = np.concatenate([perceived, self._cab_share * slope], axis=1)
+        residual = (self._scale * self._error(about, reference, free_response)).ravel()
         jacobian = (self._scale[:, :, None] * slope).reshape(len(residual), -1)
-        return Quadratic(
-            self._regular + jacobian.T @ jacobian, self._motion_gradient(plan) + residual @ jacobian
+        return QuadraticCost(
+            self._regular + jacobian.T @ jacobian, self._motion_gradient(motion) + residual @ jacobian
         )
 
     def merit(
-        self, plan: Plan, about: Linearization, reference: Floats, sensed: Floats | None, bounds: Bounds
+        self,
+        motion: Motion,
+        about: Linearization,
+        reference: Floats,
+        free_response: Floats | None,
+        bounds: Bounds,
     ) -> float:
-        """What a plan costs exactly, with the price of every limit it exceeds; see :meth:`cost`."""
-        error = self._scale * self._error(about, reference, sensed)
+        """Exact cost of a motion, with the price of every limit it exceeds (merit function of the search)."""
+        error = self._scale * self._error(about, reference, free_response)
         excess = np.maximum(np.maximum(about.values - bounds.upper, bounds.lower - about.values), 0.0)
         hard, soft = np.isfinite(bounds.price), bounds.softness > 0.0
         squares = np.sum(error**2) + np.sum(excess[soft] ** 2 / bounds.softness[soft])
         priced = bounds.price[hard] @ excess[hard]
-        return float(0.5 * (squares + self._motion_cost(plan)) + priced)
+        return float(0.5 * (squares + self._motion_cost(motion)) + priced)
 
-    def _error(self, about: Linearization, reference: Floats, sensed: Floats | None) -> Floats:
-        """(n, 6) error of the cues in zones; (n, 12) of what is sensed of them, and a share of themselves."""
+    def _error(self, about: Linearization, reference: Floats, free_response: Floats | None) -> Floats:
+        """(n, 6) error of the cues in zones; (n, 12) perceived error and a share of the cues' own."""
         error = about.values[:, :N_CUES] - reference / cue_scales()
         if self._perceived is None:
             return np.asarray(error)
-        simulated = np.einsum("cji,ic->jc", self._perceived, error)
-        return np.hstack([simulated if sensed is None else simulated + sensed, self._cab_share * error])
+        perceived = np.einsum("cji,ic->jc", self._perceived, error)
+        if free_response is not None:
+            perceived = perceived + free_response
+        return np.hstack([perceived, self._cab_share * error])
 
     def condensed(self, slopes: Floats) -> Floats:
         """(n, r, m) derivatives of rows by the unknowns, from those by their node's motion (n, r, 27)."""
@@ -139,7 +152,7 @@ class Problem:
         return np.asarray(whole.reshape(n, rows, -1))
 
     def rows(self, slopes: Floats, chosen: NDArray[np.intp]) -> Floats:
-        """(r, m) the same of some rows, numbered flat by node."""
+        """(r, m) derivatives by the unknowns of chosen rows, numbered flat by node."""
         node, row = np.divmod(chosen, slopes.shape[1])
         picked = slopes[node, row].reshape(len(chosen), 3, N_AXES)[:, :, self.axes]
         q, v, a = picked[:, 0, None], picked[:, 1, None], picked[:, 2]
@@ -147,19 +160,19 @@ class Problem:
         whole[np.arange(len(chosen)), node] += a
         return np.asarray(whole.reshape(len(chosen), -1))
 
-    def change(self, unknowns: Floats) -> Plan:
-        """What the unknowns (m,) add to a plan."""
+    def change(self, unknowns: Floats) -> Motion:
+        """Change of the motion that unknowns (m,) make."""
         acceleration = np.zeros((len(self.grid.times), N_AXES))
         acceleration[:, self.axes] = unknowns.reshape(-1, len(self.axes))
-        return Plan(self.grid.position @ acceleration, self.grid.rate @ acceleration, acceleration)
+        return Motion(self.grid.position @ acceleration, self.grid.rate @ acceleration, acceleration)
 
     def bounds(self, lower: Floats, upper: Floats, reference: Floats) -> Bounds:
-        """Bounds of every row: the machine's limits, and the tilt rate beyond the car's own.
+        """Bounds of every row: the machine's limits, and the tilt rate in excess of the car's own.
 
         Args:
             lower: (k - 6,) least values of the limit rows.
-            upper: (k - 6,) greatest.
-            reference: (n, 6) the car's cues, SI.
+            upper: (k - 6,) greatest values.
+            reference: (n, 6) reference cue, SI.
         """
         p, n = self._parameters, len(reference)
         free = np.full((n, N_CUES), np.inf)
@@ -179,24 +192,24 @@ class Problem:
             np.hstack([softness, np.zeros((n, len(lower)))]),
         )
 
-    def _motion_cost(self, plan: Plan) -> float:
-        weighted = self._weighted(plan)
-        return float(sum(np.sum(x[:, self.axes] * w) for x, w in zip(_parts(plan), weighted, strict=True)))
+    def _motion_cost(self, motion: Motion) -> float:
+        weighted = self._weighted(motion)
+        return float(sum(np.sum(x[:, self.axes] * w) for x, w in zip(_parts(motion), weighted, strict=True)))
 
-    def _motion_gradient(self, plan: Plan) -> Floats:
-        q, v, a = self._weighted(plan)
+    def _motion_gradient(self, motion: Motion) -> Floats:
+        q, v, a = self._weighted(motion)
         return np.asarray((self.grid.position.T @ q + self.grid.rate.T @ v + a).ravel())
 
-    def _weighted(self, plan: Plan) -> list[Floats]:
+    def _weighted(self, motion: Motion) -> list[Floats]:
         """Positions, rates and accelerations (n, k) times their weights."""
         return [
             (self.motion_weights[:, i] @ x[:, self.axes].T[:, :, None])[:, :, 0].T
-            for i, x in enumerate(_parts(plan))
+            for i, x in enumerate(_parts(motion))
         ]
 
 
-def _parts(plan: Plan) -> tuple[Floats, Floats, Floats]:
-    return plan.position, plan.rate, plan.acceleration
+def _parts(motion: Motion) -> tuple[Floats, Floats, Floats]:
+    return motion.position, motion.rate, motion.acceleration
 
 
 def moving_axes(platform: Platform) -> NDArray[np.intp]:
@@ -206,7 +219,7 @@ def moving_axes(platform: Platform) -> NDArray[np.intp]:
 
 
 def _axis_weights(platform: Platform, parameters: MpcParameters) -> list[AxisWeights]:
-    """By axis, in the order of ``AXES``. An unlimited turntable is nowhere away from neutral."""
+    """Weights by axis, in the order of ``AXES``. An unlimited turntable has no neutral angle to leave."""
     w = parameters.weights
     turntable = w.turntable
     if platform.turntable is not None and platform.turntable.travel is None:

@@ -1,12 +1,24 @@
-"""One thread for small matrices.
+r"""Solution of a plan: an active-set method on the dual of each quadratic program, and their sequence.
 
-BLAS shares a product among all cores. For matrices of this size that gains nothing on an idle machine, and on
-a busy one the threads wait for each other: 130 ms instead of 1 ms was measured.
+**Quadratic program.** Without limits the minimum is a Cholesky factorization away. Rows that it violates, and
+rows that held last time, get multipliers. With H = L L' and M = L^-1 A' of their rows A, the dual program
+
+    min_lambda  1/2 lambda' (M'M + softness) lambda + slack' lambda,    0 <= lambda <= price
+
+is small, always has a solution, and bounds each multiplier by the price of its limit (exact penalty). DAQP
+solves it. Rows that its solution violates join, until none does. Then it is the solution of the whole
+program, as all other rows hold (:func:`solve`).
+
+**Plan.** Linear control linearizes once about the last plan and takes the whole step. Nonlinear control is
+sequential quadratic programming: it linearizes about each new plan until the accelerations no longer change.
+A backtracking search on the exact cost and the exact limits shortens a step that would raise them
+(:class:`Planner`). Shooting from node to node is exact and linear, so the states are eliminated, and only
+cues and legs are nonlinear.
 """
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,40 +29,8 @@ from scipy.linalg import lapack
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from .parameters import MpcParameters
-from .prediction import Floats, Linearization, Linearized, Perception, make_grid
-from .problem import Bounds, Plan, Problem, Quadratic
-
-try:
-    from threadpoolctl import ThreadpoolController
-except ImportError:
-    raise ConfigurationError(
-        "this controller needs threadpoolctl, which is not installed: "
-        "pip install 'motion-cueing-gym[optimal]'"
-    ) from None
-
-
-class OneThread:
-    """Holds the libraries that are loaded when it is made to one thread: ``with one_thread(): ...``."""
-
-    def __init__(self) -> None:
-        self._libraries: Any = ThreadpoolController()
-
-    def __call__(self) -> AbstractContextManager[Any]:
-        """For the length of a block."""
-        return self._libraries.limit(limits=1, user_api="blas")  # type: ignore[no-any-return]
-
-
-# The solver: limits enter a program only where they matter.
-#
-# Without limits the minimum is a Cholesky factorization away. Limits that it violates, and those that held
-# last time, then get multipliers; with H = L L' and M = L^-1 A' of their rows A, the dual program
-#
-#     min 1/2 lambda' (M'M + softness) lambda + slack' lambda,    0 <= lambda <= price
-#
-# is small, always has a solution, and bounds each multiplier by the price of its limit, which is what an
-# exact penalty does. Rows that its solution violates join, until none does. That the rows left out hold
-# makes the solution that of the whole program.
-
+from .prediction import Floats, Linearization, MachineModel, PerceivedError, make_grid
+from .problem import Bounds, HorizonProgram, Motion, QuadraticCost
 
 try:
     import daqp as _daqp
@@ -70,22 +50,28 @@ TOLERANCE: Final = 1e-6
 _REGULAR: Final = 1e-9
 """Added to the dual's diagonal, relative to its mean: rows may depend on each other."""
 
+_UNBOUNDED: Final = 1e9
+"""Bound of a multiplier that has none."""
+
 _OPTIMAL: Final = 1
+
+_LEAST_SHARE: Final = 1.0 / 16.0
+"""Smallest share of a step that the backtracking search tries."""
 
 
 @dataclass(frozen=True)
-class Solution:
-    """What came out of a program.
+class QpSolution:
+    """Solution of a quadratic program.
 
     Args:
-        change: What it adds to the plan.
+        change: Step of the motion.
         active: Rows with a multiplier: flat by node, those of lower bounds behind all of the upper ones.
-        rounds: Duals that were given to the solver.
+        rounds: Dual programs solved.
         relaxed: Largest violation of a limit, in shares of half its range.
         solved: Whether it is the minimum.
     """
 
-    change: Plan
+    change: Motion
     active: Rows
     rounds: int
     relaxed: float
@@ -93,67 +79,78 @@ class Solution:
 
 
 def solve(
-    problem: Problem, cost: Quadratic, about: Linearization, bounds: Bounds, guess: Rows, rounds: int
-) -> Solution:
-    """Minimize a cost under the bounds.
+    program: HorizonProgram,
+    cost: QuadraticCost,
+    about: Linearization,
+    bounds: Bounds,
+    guess: Rows,
+    rounds: int,
+) -> QpSolution:
+    """Minimize a cost under bounds.
 
     Args:
-        problem: Knows what the unknowns do to the rows.
-        cost: To be minimized.
+        program: Maps unknowns to rows.
+        cost: Hessian and gradient.
         about: The rows, linearized.
         bounds: Of the rows.
-        guess: Rows that may hold, as ``Solution.active``.
-        rounds: Most duals.
+        guess: Rows that may be active, as ``QpSolution.active``.
+        rounds: Greatest number of dual programs.
     """
+    unsolved = program.change(np.zeros(program.size))
     factor, failed = lapack.dpotrf(cost.hessian, lower=1)
     if failed:
-        return _unsolved(problem, guess)
+        return QpSolution(unsolved, guess, 0, 0.0, False)
     free = -lapack.dpotrs(factor, cost.gradient, lower=1)[0]
-    unknowns, working = free, guess
-    multipliers, hard = np.zeros(0), _hard(bounds)
+    unknowns, working, multipliers = free, guess, np.zeros(0)
+    hard = np.tile(np.isfinite(bounds.price).ravel(), 2)
     for count in range(rounds + 1):
-        change = problem.change(unknowns)
-        excess = _excess(about.ahead(np.hstack([change.position, change.rate, change.acceleration])), bounds)
+        change = program.change(unknowns)
+        values = about.at(np.hstack([change.position, change.rate, change.acceleration]))
+        excess = np.concatenate([(values - bounds.upper).ravel(), (bounds.lower - values).ravel()])
         relaxed = float(max(np.max(excess[hard]), 0.0))
         excess[working] = 0.0
         violated = np.flatnonzero(excess > TOLERANCE)
         if count and not len(violated):
-            return Solution(change, working[multipliers > 0.0], count, relaxed, True)
+            return QpSolution(change, working[multipliers > 0.0], count, relaxed, True)
         working = np.concatenate([working, violated])
         if not len(working):
-            return Solution(change, working, 0, 0.0, True)
+            return QpSolution(change, working, 0, 0.0, True)
         if count == rounds:
             break
-        solved = _with_rows(problem, about, bounds, factor, free, working)
-        if solved is None:
-            return _unsolved(problem, guess, count + 1)
-        unknowns, multipliers = solved
-    return _unsolved(problem, guess, rounds)
+        solution = _solve_dual(program, about, bounds, factor, free, working)
+        if solution is None:
+            return QpSolution(unsolved, guess, count + 1, 0.0, False)
+        unknowns, multipliers = solution
+    return QpSolution(unsolved, guess, rounds, 0.0, False)
 
 
-def _excess(values: Floats, bounds: Bounds) -> Floats:
-    """(2 n k,) how far each row is above its upper bound, then below its lower one."""
-    return np.concatenate([(values - bounds.upper).ravel(), (bounds.lower - values).ravel()])
-
-
-def _hard(bounds: Bounds) -> NDArray[np.bool_]:
-    """(2 n k,) rows of the machine's limits."""
-    return np.tile(np.isfinite(bounds.price).ravel(), 2)
-
-
-def _with_rows(
-    problem: Problem, about: Linearization, bounds: Bounds, factor: Floats, free: Floats, working: Rows
+def _solve_dual(
+    program: HorizonProgram,
+    about: Linearization,
+    bounds: Bounds,
+    factor: Floats,
+    free: Floats,
+    working: Rows,
 ) -> tuple[Floats, Floats] | None:
-    """Unknowns and multipliers under some of the rows; None where the solver gives up."""
+    """Unknowns and multipliers under the working rows; None where the solver gives up.
+
+    Args:
+        program: Maps unknowns to rows.
+        about: The rows, linearized.
+        bounds: Of the rows.
+        factor: L of the Hessian.
+        free: (m,) minimum without rows.
+        working: The rows A.
+    """
     side, row = np.divmod(working, about.values.size)
     sign = 1.0 - 2.0 * side
-    matrix = sign[:, None] * problem.rows(about.slopes, row)
+    matrix = sign[:, None] * program.rows(about.slopes, row)
     bound = np.where(side == 0, bounds.upper.ravel()[row], bounds.lower.ravel()[row])
     slack = sign * (bound - about.values.ravel()[row]) - matrix @ free
     m = lapack.dtrtrs(factor, matrix.T, lower=1)[0]
     dual = m.T @ m + np.diag(bounds.softness.ravel()[row])
     dual[np.diag_indices_from(dual)] += _REGULAR * max(float(np.trace(dual)) / len(dual), 1.0)
-    price = np.minimum(bounds.price.ravel()[row], _MOST)
+    price = np.minimum(bounds.price.ravel()[row], _UNBOUNDED)
     multipliers, _, flag, _ = daqp.solve(dual, slack, np.zeros((0, len(dual))), price, np.zeros(len(dual)))
     if flag != _OPTIMAL:
         return None
@@ -161,32 +158,21 @@ def _with_rows(
     return free - step, np.asarray(multipliers)
 
 
-_MOST: Final = 1e9
-"""Bound of a multiplier that has none."""
-
-
-def _unsolved(problem: Problem, guess: Rows, rounds: int = 0) -> Solution:
-    return Solution(problem.change(np.zeros(problem.size)), guess, rounds, 0.0, False)
-
-
-# Plans: linearize, solve, and again where a controller has the time.
-
-
 @dataclass(frozen=True)
-class Planned:
-    """A plan and how it came about.
+class Plan:
+    """A plan and how it was found.
 
     Args:
-        plan: At the nodes.
+        motion: At the nodes.
         active: Limits that hold, to begin the next search with.
         solved: Whether every program was solved.
-        converged: Whether the last program asked for next to no change, or there was to be but one.
-        iterations: Programs solved.
-        rounds: Duals solved in all of them.
+        converged: Whether the last step was next to nothing, or linear control took its only one.
+        iterations: Quadratic programs solved.
+        rounds: Dual programs solved in all of them.
         relaxed: Largest violation of a linearized limit in the last one, in shares of half its range.
     """
 
-    plan: Plan
+    motion: Motion
     active: Rows
     solved: bool
     converged: bool
@@ -198,24 +184,18 @@ class Planned:
 class Planner:
     """Gauss-Newton sequential quadratic programming over the horizon.
 
-    A plan that is made of several programs is searched for along each one's change: half the change is
-    tried where the whole one costs more. A plan of one program takes its change as it is.
-
     Args:
         platform: The machine.
         parameters: Of the controller.
-        iterations: Most programs a plan; 1 linearizes once.
-        tolerance: A step that changes no acceleration by more ends the search, m/s^2 and rad/s^2.
     """
 
-    def __init__(
-        self, platform: Platform, parameters: MpcParameters, iterations: int = 1, tolerance: float = 0.0
-    ) -> None:
+    def __init__(self, platform: Platform, parameters: MpcParameters) -> None:
         self.grid = make_grid(parameters.nodes)
-        self.perception = Perception(self.grid, parameters)
-        self._linearized = Linearized(platform, len(self.grid.times), parameters.margins, parameters.compile)
-        self._problem = Problem(platform, parameters, self.grid, self.perception.response)
-        self._iterations, self._tolerance, self._rounds = iterations, tolerance, parameters.rounds
+        self.perceived = PerceivedError(self.grid, parameters)
+        self._model = MachineModel(platform, len(self.grid.times), parameters.margins, parameters.compile)
+        self._program = HorizonProgram(platform, parameters, self.grid, self.perceived.response)
+        self._iterations = parameters.iterations if parameters.nonlinear else 1
+        self._tolerance, self._rounds = parameters.tolerance, parameters.rounds
 
     def __call__(
         self,
@@ -224,80 +204,60 @@ class Planner:
         reference: Floats,
         guess: Floats,
         active: Rows,
-        sensed: Floats | None = None,
-    ) -> Planned:
+        free_response: Floats | None = None,
+    ) -> Plan:
         """The plan from a state.
 
         Args:
             position: (9,) now.
             rate: (9,) now.
-            reference: (n, 6) the car's cues at the nodes, SI.
+            reference: (n, 6) reference cue at the nodes, SI.
             guess: (n, 9) accelerations to linearize about.
             active: Limits that may hold.
-            sensed: (n, 6) what the sensors remember, see :meth:`.perceived.Perception.memory`.
+            free_response: (n, 6) perceived error that past errors leave, in zones.
         """
-        search = _Search(self._problem, self._linearized, reference, sensed)
-        plan = Plan(*self.grid.motion(position, rate, guess), guess)
+        bounds = self._program.bounds(self._model.lower, self._model.upper, reference)
+
+        def merit(motion: Motion) -> float:
+            about = self._linearized(motion)
+            return self._program.merit(motion, about, reference, free_response, bounds)
+
+        motion = Motion(*self.grid.motion(position, rate, guess), guess)
         rounds = 0
         for count in range(1, self._iterations + 1):
-            solution = search.program(plan, active, self._rounds)
+            about = self._linearized(motion)
+            cost = self._program.cost(motion, about, reference, free_response)
+            solution = solve(self._program, cost, about, bounds, active, self._rounds)
             rounds, active = rounds + solution.rounds, solution.active
             if not solution.solved:
-                return Planned(plan, active, False, False, count, rounds, 0.0)
-            share = 1.0 if self._iterations == 1 else search.share(plan, solution.change)
-            plan = after(plan, solution.change, share)
+                return Plan(motion, active, False, False, count, rounds, 0.0)
+            share = 1.0 if self._iterations == 1 else _backtrack(merit, motion, solution.change)
+            motion = stepped(motion, solution.change, share)
             largest = float(np.max(np.abs(solution.change.acceleration)))
             if share * largest <= self._tolerance:
                 break
-        # Of the whole change: a plan from which no share of it is taken is stuck, not at its end.
+        # Of the whole step: a plan from which no share of it is taken is stuck, not at a minimum.
         converged = self._iterations == 1 or largest <= self._tolerance
-        return Planned(plan, active, True, converged, count, rounds, solution.relaxed)
+        return Plan(motion, active, True, converged, count, rounds, solution.relaxed)
+
+    def _linearized(self, motion: Motion) -> Linearization:
+        return self._model(motion.position, motion.rate, motion.acceleration)
 
 
-class _Search:
-    """The programs of one plan."""
-
-    def __init__(
-        self, problem: Problem, linearized: Linearized, reference: Floats, sensed: Floats | None
-    ) -> None:
-        self._problem, self._linearized, self._reference, self._sensed = (
-            problem,
-            linearized,
-            reference,
-            sensed,
-        )
-        self._bounds = problem.bounds(linearized.lower, linearized.upper, reference)
-
-    def program(self, plan: Plan, active: Rows, rounds: int) -> Solution:
-        """Solve the program about a plan."""
-        about = self._about(plan)
-        cost = self._problem.cost(plan, about, self._reference, self._sensed)
-        return solve(self._problem, cost, about, self._bounds, active, rounds)
-
-    def share(self, plan: Plan, change: Plan) -> float:
-        """The first of 1, 1/2, 1/4 ... of a change that lowers the cost; 0 if none does."""
-        before, share = self._merit(plan), 1.0
-        while share >= _LEAST_SHARE:
-            if self._merit(after(plan, change, share)) < before:
-                return share
-            share *= 0.5
-        return 0.0
-
-    def _merit(self, plan: Plan) -> float:
-        return self._problem.merit(plan, self._about(plan), self._reference, self._sensed, self._bounds)
-
-    def _about(self, plan: Plan) -> Linearization:
-        return self._linearized(plan.position, plan.rate, plan.acceleration)
+def _backtrack(merit: Callable[[Motion], float], motion: Motion, change: Motion) -> float:
+    """The first of 1, 1/2, 1/4 ... of a change that lowers the merit function; 0 if none does."""
+    before, share = merit(motion), 1.0
+    while share >= _LEAST_SHARE:
+        if merit(stepped(motion, change, share)) < before:
+            return share
+        share *= 0.5
+    return 0.0
 
 
-_LEAST_SHARE: Final = 1.0 / 16.0
-"""Of a change that is tried."""
-
-
-def after(plan: Plan, change: Plan, share: float = 1.0) -> Plan:
-    """A plan with a share of a change."""
-    return Plan(
-        plan.position + share * change.position,
-        plan.rate + share * change.rate,
-        plan.acceleration + share * change.acceleration,
+def stepped(motion: Motion, change: Motion, share: float = 1.0) -> Motion:
+    """A motion after a share of a change."""
+    return Motion(
+        motion.position + share * change.position,
+        motion.rate + share * change.rate,
+        motion.acceleration + share * change.acceleration,
     )

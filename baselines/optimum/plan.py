@@ -1,4 +1,8 @@
-"""A plan for a whole drive, and an account of how it was found."""
+"""Plans of whole drives: their cache on disk, and their playback through the machine's own step.
+
+Plans lie in the folder ``optimum`` of :func:`~..presets.cache_folder`, by a hash of all they depend on.
+Playback tells whether a plan keeps every limit, its J, and the state that it leads to.
+"""
 
 from __future__ import annotations
 
@@ -26,21 +30,23 @@ from ...envs.storage import write_bytes
 from ..presets import cache_folder
 from .program import OptimumOptions
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
-class Account:
-    """How a plan was found.
+class PlanReport:
+    """Report of a solve.
 
     Args:
         objective: "J" or "perceived".
-        claimed: What the program says the objective is over the drive.
-        played: The same, of the plan played through the machine's step.
-        windows: How many the drive was solved in.
-        iterations: IPOPT's, of all windows and their repetitions.
-        widened: Times a window was solved anew, as the plan met a limit between nodes or a singular pose.
+        claimed: Objective over the drive, as the program has it.
+        played: Objective over the drive, of the plan played through the machine's step.
+        windows: Number of windows.
+        iterations: IPOPT's iterations, of all windows and their repetitions.
+        widened: Repetitions of a window, as its plan met a limit between nodes or a singular pose.
         unconverged: Windows that ended without a minimum.
         braked: Windows without a plan that keeps the limits, in which the machine came to a stop.
-        seconds: Wall-clock time it took.
+        seconds: Wall-clock time.
     """
 
     objective: str
@@ -54,7 +60,7 @@ class Account:
     seconds: float
 
     def notes(self) -> dict[str, str]:
-        """As text, for the record of a drive."""
+        """As text, for a trajectory's metadata."""
         return {f"optimum_{name}": f"{value}" for name, value in asdict(self).items()}
 
     def to_json(self) -> str:
@@ -62,8 +68,8 @@ class Account:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> Account:
-        """The account in a text.
+    def from_json(cls, text: str) -> PlanReport:
+        """The report in a text.
 
         Raises:
             DataError: it is none.
@@ -71,7 +77,7 @@ class Account:
         try:
             return cls(**json.loads(text))
         except (TypeError, ValueError) as error:
-            raise DataError(f"not the account of a plan ({error})") from None
+            raise DataError(f"not the report of a plan ({error})") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +87,12 @@ class Plan:
     Args:
         accelerations: (n, 9) of every time step, in the order of ``AXES``; k leads to sample k + 1.
         start: (9,) pose at the first sample.
-        account: How they were found.
+        report: How they were found.
     """
 
     accelerations: NDArray[np.float64]
     start: NDArray[np.float64]
-    account: Account
+    report: PlanReport
 
     def __post_init__(self) -> None:
         shape = np.shape(self.accelerations)
@@ -94,17 +100,12 @@ class Plan:
             raise DataError(f"a plan needs finite accelerations of shape (n, {N_AXES}), found {shape}")
 
 
-# Plans kept from one run to the next, by a hash of all that they follow from.
-#
-# They lie in the folder ``optimum`` of :func:`~..cache.cache_folder`.
-
-
 FORMULATION: Final = 3
-"""Version of the program: what changes its solutions raises it."""
+"""Version of the program: a change of its solutions raises it."""
 
 
 def plans_folder() -> Path:
-    """Where plans are kept."""
+    """Folder of the stored plans."""
     return cache_folder() / "optimum"
 
 
@@ -126,10 +127,10 @@ def key_of(
     return digest.hexdigest()
 
 
-def keep(key: str, plan: Plan) -> None:
-    """Keep a plan; where the folder cannot be written, nothing is kept."""
+def store_plan(key: str, plan: Plan) -> None:
+    """Store a plan; nothing happens where the folder cannot be written."""
     buffer = io.BytesIO()
-    account = plan.account.to_json()
+    account = plan.report.to_json()
     np.savez_compressed(
         buffer,
         accelerations=plan.accelerations,
@@ -143,8 +144,8 @@ def keep(key: str, plan: Plan) -> None:
         return
 
 
-def find(key: str, steps: int) -> Plan | None:
-    """The plan kept under a key; None where there is none, or a damaged one.
+def load_plan(key: str, steps: int) -> Plan | None:
+    """The plan stored under a key; None where there is none, or a damaged one.
 
     Args:
         key: Of :func:`key_of`.
@@ -156,7 +157,7 @@ def find(key: str, steps: int) -> Plan | None:
             account, checksum = str(file["account"]), str(file["checksum"])
         if checksum != _checksum(accelerations, start, account) or len(accelerations) != steps:
             return None
-        return Plan(accelerations, start, Account.from_json(account))
+        return Plan(accelerations, start, PlanReport.from_json(account))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, DataError):
         return None
 
@@ -169,22 +170,17 @@ def _checksum(accelerations: NDArray[np.float64], start: NDArray[np.float64], ac
     return hashlib.sha256(accelerations.tobytes() + start.tobytes() + account.encode()).hexdigest()
 
 
-# The real step, played ahead: whether a plan keeps every limit, what it is worth, and where it leads.
-
-
-Floats = NDArray[np.float64]
-
-_STRENGTH: Final = 1.0 - 1e-4
-"""Share of the limits to play with, so that braking, which uses them to the full, meets none by round-off."""
+_LIMIT_SHARE: Final = 1.0 - 1e-4
+"""Share of the limits of playback, so that braking, which uses them fully, meets none by round-off."""
 
 
 @dataclass(frozen=True)
-class Played:
-    """What became of some accelerations.
+class Playback:
+    """Accelerations played through the machine's step.
 
     Args:
         accelerations: (n, 9) that the machine followed.
-        clean: Whether it met no limit, so that they are those asked for.
+        clean: Whether no limit was met, so that they are the plan's.
         states: (n,) rows of ``Simulator.state``.
     """
 
@@ -194,12 +190,12 @@ class Played:
 
     @property
     def singular(self) -> bool:
-        """Whether it was kept from a singular pose."""
+        """Whether the machine stopped before a singular pose."""
         return bool(np.any(self.states["limits"] & np.uint64(SINGULAR)))
 
 
 class Player:
-    """A machine without lag or dead time on its way through a drive, always the time step after.
+    """A machine without lag or dead time on its way through a drive.
 
     Args:
         platform: The machine.
@@ -211,7 +207,7 @@ class Player:
     def __init__(
         self, platform: Platform, cues: CueTrace, vestibular: VestibularModel, start: ArrayLike
     ) -> None:
-        self._simulator = Simulator(_weakened(platform), cues, vestibular=vestibular, dt=cues.dt)
+        self._simulator = Simulator(_reduced(platform), cues, vestibular=vestibular, dt=cues.dt)
         self._simulator.reset(start)
 
     @property
@@ -224,24 +220,24 @@ class Player:
         return self._simulator.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to where a snapshot was taken."""
+        """Go back to a snapshot."""
         self._simulator.restore(snapshot)
 
-    def play(self, accelerations: Floats) -> Played:
+    def play(self, accelerations: Floats) -> Playback:
         """Follow accelerations (n, 9)."""
         states = np.zeros(len(accelerations), dtype=self._simulator.state.dtype)
         if np.all(np.isfinite(accelerations)):
             for k, acceleration in enumerate(accelerations):
                 states[k] = self._simulator.step(acceleration)[0]
-            return Played(accelerations, not np.any(states["limits"]), states)
-        return Played(accelerations, False, states)
+            return Playback(accelerations, not np.any(states["limits"]), states)
+        return Playback(accelerations, False, states)
 
-    def brake(self, steps: int) -> Played:
+    def brake(self, steps: int) -> Playback:
         """Come to rest as fast as every actuator may, and stand."""
         states = np.zeros(steps, dtype=self._simulator.state.dtype)
         for k in range(steps):
             states[k] = self._simulator.step(-self.rates() / self._simulator.dt)[0]
-        return Played(np.array(states["acceleration"], dtype=np.float64), True, states)
+        return Playback(np.array(states["acceleration"], dtype=np.float64), True, states)
 
     def positions(self) -> Floats:
         """(9,) in the order of ``AXES``."""
@@ -257,11 +253,11 @@ def _axes(motion: Any, actuators: str, linear: str, angular: str) -> Floats:
     return np.concatenate(parts).astype(np.float64).reshape(N_AXES)
 
 
-def _weakened(platform: Platform) -> Platform:
+def _reduced(platform: Platform) -> Platform:
     parts: dict[str, Any] = {}
     for name in ("carriage", "hexapod", "turntable"):
         part = getattr(platform, name)
         if part is not None:
-            speed, force = _STRENGTH * part.velocity, _STRENGTH * part.acceleration
+            speed, force = _LIMIT_SHARE * part.velocity, _LIMIT_SHARE * part.acceleration
             parts[name] = replace(part, velocity=speed, acceleration=force, dynamics=UNITY)
     return replace(platform, **parts)

@@ -1,4 +1,4 @@
-"""How far a solve has come, on a terminal; nothing elsewhere, or where it is soon done."""
+"""The offline optimum as a policy: it plans the whole drive before it begins, and plays its plan."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from ...envs.platform import Platform, get_platform
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE, read
 from ...envs.simulator.simulator import N_AXES
 from ..policy import checked_episode_start, checked_observation, wrong_state
-from .plan import Plan, find, keep, key_of
+from .plan import Plan, key_of, load_plan, store_plan
 from .program import OptimumOptions
 from .windows import Planner
 
 _PATIENCE: Final = 2.0
-"""Time after which something is shown, s."""
+"""Time after which the bar is shown, s."""
 
 OnWindow = Callable[[float, int], None]
 
 
 class SolveProgress:
-    """A bar over the windows of a drive, with the iterations in the one at hand.
+    """A progress bar over the windows of a drive, on a terminal, where the solve takes long.
 
     Args:
-        label: What is solved.
-        wanted: Whether to show it at all: a command that has a bar of its own does without.
+        label: Name of the solve.
+        enabled: Whether to show it at all: a command that has a bar of its own does without.
     """
 
-    def __init__(self, label: str, wanted: bool = True) -> None:
+    def __init__(self, label: str, enabled: bool = True) -> None:
         self._label, self._began = label, time.monotonic()
-        self._wanted = wanted and sys.stderr.isatty()
-        self._shown: Progress | None = None
+        self._enabled = enabled and sys.stderr.isatty()
+        self._bar: Progress | None = None
 
     @property
-    def tell(self) -> OnWindow | None:
+    def on_window(self) -> OnWindow | None:
         """Called with the share that is done and the iterations; None where nothing is shown."""
-        return self._tell if self._wanted else None
+        return self._update if self._enabled else None
 
     def __enter__(self) -> SolveProgress:
         return self
@@ -54,47 +54,40 @@ class SolveProgress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._shown is not None:
-            self._shown.stop()
+        if self._bar is not None:
+            self._bar.stop()
 
-    def _tell(self, share: float, iterations: int) -> None:
+    def _update(self, share: float, iterations: int) -> None:
         if time.monotonic() - self._began < _PATIENCE:
             return
-        if self._shown is None:
-            self._shown = _bar()
-            self._shown.start()
-            self._shown.add_task(self._label, total=1.0, iterations=0)
-        self._shown.update(self._shown.task_ids[0], completed=share, iterations=iterations)
-        self._shown.refresh()
-
-
-def _bar() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("iteration {task.fields[iterations]}"),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-        auto_refresh=False,
-    )
-
-
-# The offline optimum as a policy: it is told the whole drive, and plays its plan.
+        if self._bar is None:
+            self._bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TextColumn("iteration {task.fields[iterations]}"),
+                TimeElapsedColumn(),
+                console=Console(stderr=True),
+                transient=True,
+                auto_refresh=False,
+            )
+            self._bar.start()
+            self._bar.add_task(self._label, total=1.0, iterations=0)
+        self._bar.update(self._bar.task_ids[0], completed=share, iterations=iterations)
+        self._bar.refresh()
 
 
 _SAME: Final = 1e-3
-"""Largest difference of two poses taken for one, m and rad: less than plans keep from the limits."""
+"""Largest difference of two poses that count as one, m and rad: less than a plan's distance from limits."""
 
 
 class Optimum:
-    """The best accelerations there are for a drive that is known from beginning to end.
+    """The offline optimum: the best accelerations for a drive that is known from beginning to end.
 
     Args:
         platform: The machine; default: the paper's.
         options: The problem.
         vestibular: The driver's perception, for the objective "perceived"; default: Zacharias'.
-        cached: Whether plans are kept on disk and found again.
+        cached: Whether plans are stored on disk and loaded again.
         progress: Whether a long solve shows a bar on a terminal.
     """
 
@@ -113,7 +106,7 @@ class Optimum:
         self._cached, self._progress = cached, progress
 
     def for_drive(self, cues: CueTrace) -> PlannedDrive:
-        """The policy for one drive: solved here, or found among the plans kept.
+        """The policy for one drive: solved here, or loaded from disk.
 
         Args:
             cues: The drive, at the time step of the rollout.
@@ -139,14 +132,14 @@ class Optimum:
         """
         pose = np.zeros(N_AXES) if start is None else np.array(start, dtype=np.float64)
         key = key_of(self.platform, self.parameters, self.vestibular, cues, pose)
-        found = find(key, len(cues) - 1) if self._cached else None
-        if found is not None:
-            return found
+        stored = load_plan(key, len(cues) - 1) if self._cached else None
+        if stored is not None:
+            return stored
         with SolveProgress(f"{self.name}: {cues.name}", self._progress) as progress:
-            planner = Planner(self.platform, self.parameters, self.vestibular, cues, pose, progress.tell)
+            planner = Planner(self.platform, self.parameters, self.vestibular, cues, pose, progress.on_window)
             plan = planner.plan()
         if self._cached:
-            keep(key, plan)
+            store_plan(key, plan)
         return plan
 
 
@@ -165,8 +158,8 @@ class PlannedDrive:
 
     @property
     def notes(self) -> Mapping[str, str]:
-        """How the plan was found."""
-        return self.plan.account.notes()
+        """Report of the solve, for a trajectory's metadata."""
+        return self.plan.report.notes()
 
     def predict(
         self,
@@ -193,20 +186,17 @@ class PlannedDrive:
                 f"a plan is for one machine: the observation must have {OBSERVATION_SIZE} entries, found "
                 f"shape {rows.shape}"
             )
-        done = _checked_state(state)
+        step = _checked_state(state)
         begins = state is None or (
             episode_start is not None and bool(checked_episode_start(episode_start, 1)[0])
         )
-        step = 0 if begins else done
         if begins:
-            self._begin_at(pose_of(rows.reshape(-1)))
+            step, pose = 0, pose_of(rows.reshape(-1))
+            if np.abs(pose - self.plan.start).max() > _SAME:
+                self.plan = self._optimum.plan(self._cues, pose)
         within = step < len(self.plan.accelerations)
-        answer = self.plan.accelerations[step] if within else np.zeros(N_AXES)
-        return answer.reshape((*rows.shape[:-1], N_AXES)).copy(), step + 1
-
-    def _begin_at(self, pose: NDArray[np.float64]) -> None:
-        if np.abs(pose - self.plan.start).max() > _SAME:
-            self.plan = self._optimum.plan(self._cues, pose)
+        action = self.plan.accelerations[step] if within else np.zeros(N_AXES)
+        return action.reshape((*rows.shape[:-1], N_AXES)).copy(), step + 1
 
 
 def _checked_state(state: Any) -> int:

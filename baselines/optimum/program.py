@@ -1,4 +1,33 @@
-"""What can be chosen about the optimum, as a configuration."""
+r"""The optimal control problem of a drive: options, cost, motion from node to node, and limits, in symbols.
+
+The drive is known. Unknown are the accelerations a_k at nodes ``steps`` time steps apart; between nodes they
+are straight lines. With q and v positions and rates of the nine axes, and x the states of the vestibular
+filters,
+
+    minimize    sum over samples |e|^2 / steps + effort sum over nodes |s|^2
+    subject to  [q, v, x]_{k+1} = F(q_k, v_k, x_k, a_k, a_{k+1})      (:func:`interval`)
+                lower <= h(q_k, v_k, a_k) <= upper                    (:func:`node_limits`)
+                [q, v, x]_0 given.
+
+**Cost.** e is the error of the six cues in indifference zones, so that the first sum is J times the number of
+nodes. For the perceived objective it is filtered by the vestibular system (:class:`PerceivedErrorFilter`): as
+canals and otoliths are linear, the difference of two perceived cues is the perceived difference. s is the
+machine's own motion, each part in its large value (:func:`effort`). It decides among motions of equal cues.
+
+**Motion.** The machine takes the mean of each time step, which is the line at the middle of the step, and
+integrates exactly. So nothing is lost between plan and machine, and the errors are those of every sample.
+
+**Limits.** With extension l of an actuator, its limits V of speed and A of acceleration, the spacing T of the
+nodes, and the clearance c of a pose (det J over its value at neutral),
+
+    l + ldot^2 / (2 A) <= l_max,    l - ldot^2 / (2 A) >= l_min,
+    |ldot + lddot T / 4| <= V,      |ldot - lddot T / 4| <= V,      |lddot| <= A,
+    c(q) >= c_min,    c(q + v tau / 2) >= c_min,    tau = |ldot|_2 / A.
+
+The first line holds exactly if the actuator can always be stopped in time. In the second, T / 4 covers the
+way between nodes: where lddot is a straight line that crosses zero, ldot peaks there. The last line is
+optional. It keeps the platform from singular poses: tau is no shorter than the legs take to brake.
+"""
 
 from __future__ import annotations
 
@@ -25,21 +54,21 @@ Share = Annotated[float, Field(ge=0.0, lt=0.5)]
 
 @configuration
 class OptimumOptions:
-    """The problem that is solved, and how.
+    """Options of the optimal control problem and its solver.
 
     Args:
-        objective: "J" for the cues at the cab, "perceived" for what the driver senses of them at the head.
+        objective: "J" for the cues at the cab, "perceived" for the perceived cues at the head.
         steps: Time steps of the machine (10 ms) from one node to the next; accelerations are straight
             lines between nodes. Raise it and a solve is faster, and sharp cues are cut off.
         window: Greatest length of a drive that is solved as a whole, s. Longer ones are solved in windows.
-        keep: Of each window that is kept before the next one begins, s; the rest is looking ahead.
-        force_zone: Error of specific force no driver minds, m/s^2; as in J (Slob et al.).
-        rate_zone: Error of angular velocity no driver minds, rad/s; as in J.
+        keep: Part of each window that is applied before the next one begins, s; the rest is preview.
+        force_zone: Indifference zone of specific force, m/s^2; as in J (Slob et al.).
+        rate_zone: Indifference zone of angular velocity, rad/s; as in J.
         effort: Weight of the machine's own motion, so that axes that do the same share it. Raise it and the
             machine stays nearer to neutral, with a higher J.
-        margin: Share of the limits of speed and acceleration that is left free between nodes.
-        widenings: How often a plan that meets a limit between nodes is solved anew: with three times the
-            margin, or, where it came near a singular pose, clear of those.
+        margin: Share of the limits of speed and acceleration that is kept free, for the way between nodes.
+        widenings: How often a plan that meets a limit between nodes is solved again: with three times the
+            margin, or, where it came near a singular pose, with the limit on clearance.
         barrier: Weight of IPOPT's logarithmic barrier at the end. Lower it and plans come nearer to the
             limits, with a J lower by a percent at most and more iterations.
         tolerance: Of IPOPT: largest violation of the conditions of a minimum.
@@ -66,27 +95,22 @@ class OptimumOptions:
             )
 
 
-# The driver's vestibular system as one linear filter of the error of the cues.
-#
-# Canals and otoliths are linear, so what is sensed of the simulator less what is sensed of the car is what
-# they would sense of the difference of both. Its order is that of the published models: two for each otolith,
-# three for each canal, as ``envs.perception.models`` discretizes them.
-
-
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SensedError:
+class PerceivedErrorFilter:
     """x' = A x + B e, y = C x + D e for the error e (6,) of force and rate; each signal has its own states.
+
+    Its order is that of the published models: two for each otolith, three for each canal.
 
     Args:
         a: (m, m).
         b: (m, 6).
         c: (6, m).
         d: (6,) feedthrough.
-        size: (m,) what one unit of each state stands for in the published filter's own.
-        place: (m,) where each state lies in rows of three, one row a signal, as the machine keeps them.
+        size: (m,) value of one unit of each state in the published filter's own states.
+        place: (m,) index of each state in rows of three, one row a signal, as the simulator keeps them.
     """
 
     a: Floats
@@ -96,7 +120,7 @@ class SensedError:
     size: Floats
     place: NDArray[np.int64]
 
-    def ahead(self, filters: Floats, error: Floats) -> Floats:
+    def next_state(self, filters: Floats, error: Floats) -> Floats:
         """(m,) the states for the next sample.
 
         Args:
@@ -106,7 +130,7 @@ class SensedError:
         return np.asarray(self.a @ (filters.ravel()[self.place] / self.size) + self.b @ error)
 
 
-def sensed_error(model: VestibularModel, dt: float) -> SensedError:
+def perceived_error_filter(model: VestibularModel, dt: float) -> PerceivedErrorFilter:
     """The filter at a time step, s; its states are scaled to unit size under white noise."""
     otolith = discretize(*model.otoliths.transfer_function(), dt)
     canals = [discretize(*model.canals.transfer_function(axis), dt) for axis in range(3)]
@@ -115,7 +139,7 @@ def sensed_error(model: VestibularModel, dt: float) -> SensedError:
     sizes = [part[3] for part in parts]
     place = np.concatenate([3 * i + np.arange(len(size)) for i, size in enumerate(sizes)])
     d = np.array([part.d for part in [otolith] * 3 + canals])
-    return SensedError(a, b, c, d, np.concatenate(sizes), place)
+    return PerceivedErrorFilter(a, b, c, d, np.concatenate(sizes), place)
 
 
 def _scaled(part: DiscreteFilter) -> tuple[Floats, Floats, Floats, Floats]:
@@ -124,9 +148,6 @@ def _scaled(part: DiscreteFilter) -> tuple[Floats, Floats, Floats, Floats]:
     a, b, c = part.a[:m, :m], part.b[:m, None], part.c[None, :m]
     size = np.sqrt(np.diag(solve_discrete_lyapunov(a, b @ b.T)))
     return a * size / size[:, None], b / size[:, None], c * size, size
-
-
-# The machine's own motion, which costs next to nothing: it decides among plans of equal cues.
 
 
 _REACH: Final = (10.0, 10.0, 1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 10.0)
@@ -140,7 +161,7 @@ _PUSH: Final = (3.0, 3.0, 3.0, 3.0, 3.0, 2.0, 2.0, 2.0, 2.0)
 
 
 def effort(q: Expression, v: Expression, a: Expression, b: Expression) -> Expression:
-    """Distances from neutral, rates, accelerations and their changes, each in its large value."""
+    """Displacements, rates, accelerations and their changes on an interval, each in its large value."""
     parts = (
         q / cs.DM(_REACH),
         v / cs.DM(_PACE),
@@ -148,13 +169,6 @@ def effort(q: Expression, v: Expression, a: Expression, b: Expression) -> Expres
         (b - a) / cs.DM(_PUSH),
     )
     return cs.vertcat(*parts)
-
-
-# The motion from one node to the next, in symbols: where it leads, and the errors on its way.
-#
-# Accelerations are straight lines between nodes. The machine takes the mean of each of its time steps, which
-# is the line at the middle of the step, and integrates exactly; so nothing is lost between this plan and the
-# machine, and the errors are those of every sample.
 
 
 N_CUES = 6
@@ -168,10 +182,10 @@ class Interval:
     Args:
         q: (9,) positions at its first node.
         v: (9,) rates there.
-        x: (m,) states of the sensed error there, empty for J.
+        x: (m,) states of the vestibular filters there, empty for J.
         a: (9,) accelerations there.
         b: (9,) accelerations at its last node.
-        reference: (7, steps) the car's force and rate at its samples, and 1, or 0 after the end of the drive.
+        reference: (7, steps) reference cue at its samples, and 1, or 0 after the end of the drive.
         end: (18 + m,) q, v, x at the last node.
         errors: (6 steps,) errors of all samples in indifference zones.
     """
@@ -194,18 +208,18 @@ def mean_accelerations(nodes: NDArray[np.float64], steps: int) -> NDArray[np.flo
 
 
 def interval(
-    machine: SymbolicMachine, options: OptimumOptions, sensed: SensedError | None, dt: float
+    machine: SymbolicMachine, options: OptimumOptions, perceived: PerceivedErrorFilter | None, dt: float
 ) -> Interval:
-    """The interval's expressions.
+    """The motion and the errors from one node to the next.
 
     Args:
         machine: The machine.
         options: Zones, and the number of steps.
-        sensed: The filter to put errors through; None to take them as they are.
+        perceived: Vestibular filter of the errors; None to take them as they are.
         dt: Time step of the machine, s.
     """
     q, v, a, b = (cs.SX.sym(name, N_AXES) for name in "qvab")
-    x = cs.SX.sym("x", 0 if sensed is None else len(sensed.a))
+    x = cs.SX.sym("x", 0 if perceived is None else len(perceived.a))
     reference = cs.SX.sym("reference_cue", N_CUES + 1, options.steps)
     cab = machine.platform.cab
     point = cs.DM(cab.reference_point) + (0.0 if options.objective == "J" else cs.DM(cab.head))
@@ -215,10 +229,10 @@ def interval(
         mean = a + (b - a) * ((k + 0.5) / options.steps)
         position, rate = position + dt * (rate + 0.5 * dt * mean), rate + dt * mean
         error = (cs.vertcat(*cues(point, position, rate, mean)) - reference[:N_CUES, k]) / zones
-        if sensed is not None:
-            simulated = error
-            error = _sparse(sensed.c) @ memory + cs.DM(sensed.d) * simulated
-            memory = _sparse(sensed.a) @ memory + _sparse(sensed.b) @ simulated
+        if perceived is not None:
+            cue_error = error
+            error = _sparse(perceived.c) @ memory + cs.DM(perceived.d) * cue_error
+            memory = _sparse(perceived.a) @ memory + _sparse(perceived.b) @ cue_error
         errors.append(error * reference[N_CUES, k])
     return Interval(q, v, x, a, b, reference, cs.vertcat(position, rate, memory), cs.vertcat(*errors))
 
@@ -227,28 +241,8 @@ def _sparse(matrix: NDArray[np.float64]) -> Expression:
     return cs.sparsify(cs.DM(matrix))
 
 
-# The limits of a machine at a node, as inequalities lower <= h(q, v, a) <= upper.
-#
-# With the extension l of an actuator, its limits of speed V and acceleration A, and the spacing T of
-# the nodes:
-#
-#     l + ldot^2 / (2 A) <= l_max,    l - ldot^2 / (2 A) >= l_min,
-#     |ldot + lddot T / 4| <= V,      |ldot - lddot T / 4| <= V,      |lddot| <= A,
-#
-# and where it is asked for, with the clearance c of a pose (det J over its value at neutral),
-#
-#     c(q) >= c_min,    c(q + v tau / 2) >= c_min,    tau = |ldot|_2 / A.
-#
-# The first line holds for a motion within its limits exactly if it can always be stopped in time. In
-# the second
-# one T / 4 is for the way between nodes: where lddot is a straight line that crosses zero, ldot peaks there.
-# The last line keeps the platform from singular poses: tau is no shorter than the legs take to brake, v
-# tau / 2
-# no shorter than the way there.
-
-
 _SPARE_CLEARANCE: Final = 0.03
-"""On top of what the machine insists on, for the way between nodes."""
+"""Clearance beyond the machine's own limit, for the way between nodes."""
 
 _NO_RATE: Final = 1e-3
 """Below it the way of braking legs is taken as none, m/s: keeps a square root smooth."""
@@ -288,8 +282,8 @@ def node_limits(
         a: (9,) accelerations.
         spacing: From one node to the next, s.
         margin: Share of the limits of speed and acceleration that is kept free.
-        widened: The same where it is wider than what was counted on for braking; default: ``margin``.
-        clear: Whether to keep away from singular poses. Most motions come nowhere near one.
+        widened: A wider share for everything but braking; default: ``margin``.
+        clear: Whether to limit the clearance. Most motions come nowhere near a singular pose.
     """
     legs, limits = machine.leg_motion(q, v, a), machine.limits
     extension, rate, acceleration = (

@@ -1,4 +1,12 @@
-"""What goes on during a solve: its iterations, and Ctrl-C, which ends it after the iteration at hand."""
+r"""Direct transcription: a window of a drive as a nonlinear program for IPOPT, with structured derivatives.
+
+Variables are w = [q, v, x, a] of every node, one node behind another. Those of an interval are z = [w, b],
+with b the a of the next node. Constraints are the gaps of all intervals, then the limits at all nodes.
+
+CasADi functions of one interval (:class:`Blocks`) are mapped over all of them, and their nonzeros are placed
+into sparse matrices of the window. So nothing has to be found by coloring. The Hessian of the cost is that of
+Gauss and Newton, which keeps every step a descent; that of the limits is exact.
+"""
 
 from __future__ import annotations
 
@@ -19,65 +27,67 @@ from .program import Interval, NodeLimits, OptimumOptions, effort
 OnIteration = Callable[[int], None]
 
 
-class Watch:
-    """Hears of iterations, and remembers whether an end was asked for.
+class SolveMonitor:
+    """Counts the iterations of a solve, and ends it after the iteration at hand on Ctrl-C.
 
     Args:
-        tell: Called with the number of iterations done.
+        on_iteration: Called with the number of iterations done.
     """
 
-    def __init__(self, tell: OnIteration | None = None) -> None:
-        self._tell = tell
-        self._done = 0
-        self._asked = False
+    def __init__(self, on_iteration: OnIteration | None = None) -> None:
+        self._on_iteration = on_iteration
+        self._iterations = 0
+        self._interrupted = False
 
-    def heard(self) -> bool:
-        """One more iteration is done; returns whether to stop."""
-        self._done += 1
-        if self._tell is not None:
-            self._tell(self._done)
-        return self._asked
+    def count(self) -> bool:
+        """Count an iteration; returns whether to stop."""
+        self._iterations += 1
+        if self._on_iteration is not None:
+            self._on_iteration(self._iterations)
+        return self._interrupted
 
     @contextmanager
     def solving(self) -> Iterator[None]:
-        """A solve.
+        """Context of a solve.
 
         CasADi would take a KeyboardInterrupt for a function that cannot be evaluated, and go on.
 
         Raises:
             KeyboardInterrupt: at the end of the solve, if Ctrl-C was pressed in it.
         """
-        self._done, self._asked = 0, False
+        self._iterations, self._interrupted = 0, False
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        before = signal.signal(signal.SIGINT, lambda number, frame: self._ask())
+        before = signal.signal(signal.SIGINT, lambda number, frame: self._interrupt())
         try:
             yield
         finally:
             signal.signal(signal.SIGINT, before)
-        if self._asked:
+        if self._interrupted:
             raise KeyboardInterrupt
 
-    def _ask(self) -> None:
-        self._asked = True
+    def _interrupt(self) -> None:
+        self._interrupted = True
 
 
-def listener(variables: int, constraints: int, parameters: int, watch: Watch) -> Expression:
-    """CasADi's call after every iteration.
+def iteration_callback(
+    variables: int, constraints: int, parameters: int, monitor: SolveMonitor
+) -> Expression:
+    """CasADi's callback after every iteration.
 
     Args:
-        variables: Of the program.
-        constraints: Of the program.
-        parameters: Of the program.
-        watch: Who hears of it.
+        variables: Their number.
+        constraints: Their number.
+        parameters: Their number.
+        monitor: Counts the iterations.
     """
     sizes = {"x": variables, "f": 1, "g": constraints, "lam_x": variables, "lam_g": constraints}
 
-    class Listener(cs.Callback):  # type: ignore[misc]
+    class Callback(cs.Callback):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__()
-            self.construct("listener", {})
+            self.construct("iteration", {})
 
         def get_n_in(self) -> int:
             return int(cs.nlpsol_n_out())
@@ -89,14 +99,9 @@ def listener(variables: int, constraints: int, parameters: int, watch: Watch) ->
             return cs.Sparsity.dense(sizes.get(cs.nlpsol_out(i), parameters), 1)
 
         def eval(self, arguments: Any) -> list[int]:
-            return [int(watch.heard())]
+            return [int(monitor.count())]
 
-    return Listener()
-
-
-# Functions of one interval, made of its expressions, and where their parts lie among all nodes' variables.
-#
-# A node's variables are w = [q, v, x, a]; an interval's are z = [w, b], b being the a of the next node.
+    return Callback()
 
 
 Indices = NDArray[np.int64]
@@ -106,16 +111,15 @@ Indices = NDArray[np.int64]
 class Blocks:
     """CasADi functions of one interval, and of its first node.
 
-    The Hessian of the cost is Gauss and Newton's, that of the sum of squares with errors taken as linear:
-    it has no negative curvature, and near a good plan it is as good as the exact one. That of the limits
-    is exact.
+    The Hessian of the cost is Gauss and Newton's: errors are taken as linear. It has no negative curvature,
+    and near a good plan it is as good as the exact one. That of the limits is exact.
 
     Args:
-        cost: (z, wanted) to [errors' part, effort's part] (2,).
-        gradient: (z, wanted) to the gradient of their sum.
-        hessian: (z, wanted, scale) to the upper triangle of its Hessian times a scale.
-        end: (z, wanted) to q, v, x at the next node.
-        end_jacobian: (z, wanted) to its Jacobian.
+        cost: (z, reference) to [errors' part, effort's part] (2,).
+        gradient: (z, reference) to the gradient of their sum.
+        hessian: (z, reference, scale) to the upper triangle of its Hessian times a scale.
+        end: (z, reference) to q, v, x at the next node.
+        end_jacobian: (z, reference) to its Jacobian.
         limits: (w) to the values of the inequalities.
         limits_jacobian: (w) to their Jacobian.
         limits_hessian: (w, multipliers) to the upper triangle of the Hessian of their weighted sum.
@@ -147,16 +151,16 @@ def blocks_of(part: Interval, limits: NodeLimits, options: OptimumOptions) -> Bl
     scale, lam = cs.SX.sym("scale"), cs.SX.sym("lam", limits.value.numel())
     curvature = cs.hessian(cs.dot(lam, limits.value), w)[0]
 
-    def function(name: str, inputs: list[Expression], value: Expression) -> Expression:
-        return cs.Function(name, inputs, [value], {"cse": True})
+    def function(name: str, arguments: list[Expression], value: Expression) -> Expression:
+        return cs.Function(name, arguments, [value], {"cse": True})
 
-    given = [z, part.reference]
+    inputs = [z, part.reference]
     return Blocks(
-        cost=function("cost", given, cs.vertcat(cs.sumsqr(errors), cs.sumsqr(own))),
-        gradient=function("gradient", given, cs.gradient(cs.sumsqr(residuals), z)),
-        hessian=function("hessian", [*given, scale], cs.triu(2.0 * scale * slope.T @ slope)),
-        end=function("end", given, part.end),
-        end_jacobian=function("end_jacobian", given, cs.jacobian(part.end, z)),
+        cost=function("cost", inputs, cs.vertcat(cs.sumsqr(errors), cs.sumsqr(own))),
+        gradient=function("gradient", inputs, cs.gradient(cs.sumsqr(residuals), z)),
+        hessian=function("hessian", [*inputs, scale], cs.triu(2.0 * scale * slope.T @ slope)),
+        end=function("end", inputs, part.end),
+        end_jacobian=function("end_jacobian", inputs, cs.jacobian(part.end, z)),
         limits=function("limits", [w], limits.value),
         limits_jacobian=function("limits_jacobian", [w], cs.jacobian(limits.value, w)),
         limits_hessian=function("limits_hessian", [w, lam], cs.triu(curvature)),
@@ -166,12 +170,9 @@ def blocks_of(part: Interval, limits: NodeLimits, options: OptimumOptions) -> Bl
 
 
 def interval_variables(blocks: Blocks) -> Indices:
-    """Where z of the first interval lies among the variables of all nodes; the k-th lies k nodes further."""
+    """Indices of the first interval's z among the variables of all nodes; the k-th lies k nodes further."""
     w = np.arange(blocks.node_size)
     return np.concatenate([w, blocks.node_size + w[-N_AXES:]])
-
-
-# Sparse matrices of a whole window, put together of one small matrix an interval.
 
 
 def triplets(function: Expression) -> tuple[Indices, Indices]:
@@ -195,23 +196,13 @@ def assembled(shape: tuple[int, int], parts: list[tuple[Indices, Indices, Expres
 
 
 def repeated(indices: Indices, step: int, which: Indices) -> Indices:
-    """Indices of a block for each of its places: shifted by ``step`` times each of ``which``."""
+    """Indices of a block, repeated: shifted by ``step`` times each of ``which``."""
     return (indices[None, :] + step * which[:, None]).ravel()
 
 
 def nonzeros(matrix: Expression) -> Expression:
     """The nonzeros of a matrix as a column."""
     return matrix.nz[:]
-
-
-# A window of a drive as a nonlinear program for IPOPT.
-#
-#     minimize    sum of squared errors / steps + effort
-#     subject to  the motion from node to node, and the limits at every node.
-#
-# Variables are [q, v, x, a] of every node, one node behind another; constraints for each interval its end
-# and the limits there. The matrices are given to IPOPT as they follow from the structure, so that nothing is
-# found out by coloring, and a Hessian of Gauss and Newton keeps every step a descent.
 
 
 _QUIET: Final = {"print_level": 0, "sb": "yes"}
@@ -224,7 +215,7 @@ class Transcription:
         blocks: Functions of one interval.
         intervals: How many there are.
         ipopt: Options of IPOPT.
-        watch: Hears of iterations.
+        monitor: Counts iterations.
     """
 
     def __init__(
@@ -232,7 +223,7 @@ class Transcription:
         blocks: Blocks,
         intervals: int,
         ipopt: dict[str, Any],
-        watch: Watch,
+        monitor: SolveMonitor,
     ) -> None:
         self.blocks, self.intervals = blocks, intervals
         n = blocks.node_size
@@ -244,27 +235,27 @@ class Transcription:
         self._reference = cs.reshape(self._p, blocks.cost.size1_in(1), -1)
         self.gaps = blocks.state_size * intervals
         self.constraints = self.gaps + blocks.limits.numel_out(0) * (intervals + 1)
-        # An attribute: CasADi does not keep it.
-        self._listener = listener(self._x.numel(), self.constraints, self._p.numel(), watch)
+        # An attribute: CasADi keeps no reference to it.
+        self._callback = iteration_callback(self._x.numel(), self.constraints, self._p.numel(), monitor)
         problem = {"x": self._x, "p": self._p, "f": self._cost(), "g": self._values()}
         options = {
             "grad_f": self._gradient(),
             "jac_g": self._jacobian(),
             "hess_lag": self._hessian(),
-            "iteration_callback": self._listener,
+            "iteration_callback": self._callback,
             "print_time": False,
             "calc_lam_p": False,
             "ipopt": _QUIET | ipopt,
         }
         self.solver: Expression = cs.nlpsol("optimum", "ipopt", problem, options)
 
-    def _map(self, function: Expression, *given: Expression) -> Expression:
+    def _map(self, function: Expression, *inputs: Expression) -> Expression:
         """A function of every interval."""
-        return function.map(self.intervals)(*given)
+        return function.map(self.intervals)(*inputs)
 
-    def _at_nodes(self, function: Expression, *given: Expression) -> Expression:
+    def _at_nodes(self, function: Expression, *inputs: Expression) -> Expression:
         """A function of every node."""
-        return function.map(self.intervals + 1)(self._nodes, *given)
+        return function.map(self.intervals + 1)(self._nodes, *inputs)
 
     def _cost(self) -> Expression:
         return cs.sum1(cs.sum2(self._map(self.blocks.cost, self._z, self._reference)))
@@ -278,8 +269,8 @@ class Transcription:
     def _gradient(self) -> Expression:
         n = self.blocks.node_size
         parts = self._map(self.blocks.gradient, self._z, self._reference)
-        ahead = cs.vertcat(cs.MX(n - N_AXES, self.intervals), parts[n:, :])
-        total = cs.horzcat(parts[:n, :], cs.MX(n, 1)) + cs.horzcat(cs.MX(n, 1), ahead)
+        next_node = cs.vertcat(cs.MX(n - N_AXES, self.intervals), parts[n:, :])
+        total = cs.horzcat(parts[:n, :], cs.MX(n, 1)) + cs.horzcat(cs.MX(n, 1), next_node)
         return cs.Function(
             "nlp_grad_f",
             [self._x, self._p],

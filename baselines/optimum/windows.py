@@ -1,4 +1,10 @@
-"""The optimum of a window of a drive: what the car does and how the machine moves at its start, to a plan."""
+"""The solve: a window of a drive by IPOPT, and a drive of any length by windows that overlap.
+
+Each window looks beyond the part of it that is applied (receding horizon); the last one reaches to the end of
+the drive. Every plan is played through the machine's own step before it is taken. A plan that meets a limit
+between nodes is solved again with a wider margin, one that comes near a singular pose with a limit on
+clearance. Where no plan keeps the limits, the machine brakes.
+"""
 
 from __future__ import annotations
 
@@ -16,23 +22,23 @@ from ...envs.perception import VestibularModel
 from ...envs.platform import Platform
 from ...envs.simulator.simulator import N_AXES
 from ..symbolic import SymbolicMachine
-from .plan import Account, Plan, Played, Player
+from .plan import Plan, PlanReport, Playback, Player
 from .program import (
     N_CUES,
     OptimumOptions,
-    SensedError,
+    PerceivedErrorFilter,
     axis_bounds,
     interval,
     mean_accelerations,
     node_limits,
-    sensed_error,
+    perceived_error_filter,
 )
-from .transcription import Blocks, OnIteration, Transcription, Watch, blocks_of
+from .transcription import Blocks, OnIteration, SolveMonitor, Transcription, blocks_of
 
 Floats = NDArray[np.float64]
 
 _LEG_ACCELERATIONS: Final = 6
-"""The last inequalities of a node: the only ones that its accelerations can still change at the start."""
+"""Last inequalities of a node: at the start of a window, accelerations can change no others."""
 
 _ACCEPTABLE: Final = {
     "acceptable_tol": 0.2,
@@ -44,12 +50,15 @@ _ACCEPTABLE: Final = {
 }
 """IPOPT also stops where the cost has stood still to a thousandth, and limits are kept to a millimeter."""
 
+_SHAPING: Final = ("objective", "steps", "force_zone", "rate_zone", "effort", "margin")
+"""Options that the functions of an interval depend on; programs that differ in others share them."""
+
 _CONVERGED: Final = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True)
-class Solution:
-    """What IPOPT came to.
+class WindowSolution:
+    """Solution of a window.
 
     Args:
         nodes: (intervals + 1, node_size) variables.
@@ -57,7 +66,7 @@ class Solution:
         costs: (intervals,) sum of squared errors of the samples of each.
         converged: Whether it is a minimum.
         iterations: IPOPT's.
-        status: IPOPT's word for how it ended.
+        status: IPOPT's return status.
     """
 
     nodes: Floats
@@ -69,13 +78,13 @@ class Solution:
 
 
 @dataclass(frozen=True)
-class Start:
-    """The machine and its driver at the start of a window.
+class WindowStart:
+    """State of machine and vestibular filters at the start of a window.
 
     Args:
         position: (9,) m and rad.
         rate: (9,).
-        memory: (m,) states of the sensed error for the next sample, in indifference zones; empty for J.
+        memory: (m,) states of the perceived error for the next sample, in indifference zones; empty for J.
     """
 
     position: Floats
@@ -102,24 +111,24 @@ def _parts(
 ) -> Parts:
     """Made once for all drives on a machine; without a filter if there is no model of perception."""
     machine = SymbolicMachine(platform)
-    sensed = None if vestibular is None else sensed_error(vestibular, dt)
-    part = interval(machine, options, sensed, dt)
+    perceived = None if vestibular is None else perceived_error_filter(vestibular, dt)
+    part = interval(machine, options, perceived, dt)
     spacing = options.steps * dt
     limits = node_limits(machine, part.q, part.v, part.a, spacing, options.margin, margin, clear)
     return Parts(blocks_of(part, limits, options), limits.lower, limits.upper)
 
 
-class Problem:
-    """Windows of drives on one machine.
+class WindowProgram:
+    """The nonlinear program of windows on one machine.
 
     Args:
         platform: The machine.
-        options: What to minimize, and how.
+        options: Of the problem and the solver.
         vestibular: The driver's perception; None to take errors as they are.
         dt: Time step of the machine, s.
         margin: Share of the limits of speed and acceleration to keep free.
         clear: Whether to keep away from singular poses.
-        tell: Called with IPOPT's iterations so far.
+        on_iteration: Called with IPOPT's iterations so far.
     """
 
     def __init__(
@@ -130,25 +139,26 @@ class Problem:
         dt: float,
         margin: float,
         clear: bool = False,
-        tell: OnIteration | None = None,
+        on_iteration: OnIteration | None = None,
     ) -> None:
         self.options, self.dt, self.margin, self.clear = options, dt, margin, clear
         self._vestibular = vestibular
         self._machine = SymbolicMachine(platform)
-        self._watch = Watch(tell)
-        self.sensed: SensedError | None = None
-        self._plain: Problem | None = None
+        self._monitor = SolveMonitor(on_iteration)
+        self.perceived: PerceivedErrorFilter | None = None
+        self._plain: WindowProgram | None = None
         if vestibular is not None:
-            self.sensed = sensed_error(vestibular, dt)
-            self._plain = Problem(platform, options, None, dt, margin, clear, tell)
+            self.perceived = perceived_error_filter(vestibular, dt)
+            self._plain = WindowProgram(platform, options, None, dt, margin, clear, on_iteration)
         self._transcriptions: dict[int, Transcription] = {}
 
     @cached_property
     def _parts(self) -> Parts:
-        machine, options = self._machine.platform, self.options
-        return _parts(machine, options, self._vestibular, self.dt, self.margin, self.clear)
+        shaping = {name: getattr(self.options, name) for name in _SHAPING}
+        options = OptimumOptions(**shaping)
+        return _parts(self._machine.platform, options, self._vestibular, self.dt, self.margin, self.clear)
 
-    def solve(self, reference: Floats, start: Start) -> Solution:
+    def solve(self, reference: Floats, start: WindowStart) -> WindowSolution:
         """The best accelerations for a window.
 
         Args:
@@ -159,20 +169,20 @@ class Problem:
             KeyboardInterrupt: Ctrl-C was pressed.
         """
         count = -(-len(reference) // self.options.steps)
-        given = self._given(reference, count)
+        cues = self._cues(reference, count)
         program = self._transcription(count)
         lower, upper = self._bounds(count, start)
         least, most = self._ranges(program)
-        guess, before = self._guess(reference, given, count, start)
-        with self._watch.solving():
-            result = program.solver(x0=guess, p=given, lbx=lower, ubx=upper, lbg=least, ubg=most)
+        guess, before = self._guess(reference, cues, count, start)
+        with self._monitor.solving():
+            result = program.solver(x0=guess, p=cues, lbx=lower, ubx=upper, lbg=least, ubg=most)
         stats = program.solver.stats()
         x = np.array(result["x"])[:, 0]
         nodes = x.reshape(count + 1, -1)
-        return Solution(
+        return WindowSolution(
             nodes,
             mean_accelerations(nodes[:, -N_AXES:], self.options.steps)[: len(reference)],
-            program.errors(x, given) * self.options.steps,
+            program.errors(x, cues) * self.options.steps,
             stats["return_status"] in _CONVERGED,
             int(stats["iter_count"]) + before,
             str(stats["return_status"]),
@@ -180,7 +190,9 @@ class Problem:
 
     def _transcription(self, count: int) -> Transcription:
         if count not in self._transcriptions:
-            self._transcriptions[count] = Transcription(self._parts.blocks, count, self._ipopt(), self._watch)
+            self._transcriptions[count] = Transcription(
+                self._parts.blocks, count, self._ipopt(), self._monitor
+            )
         return self._transcriptions[count]
 
     def _ipopt(self) -> dict[str, Any]:
@@ -194,18 +206,18 @@ class Problem:
             **_ACCEPTABLE,
         }
 
-    def _given(self, reference: Floats, count: int) -> Floats:
-        """The car's cues at all samples, and whether they count; what is after the end does not."""
+    def _cues(self, reference: Floats, count: int) -> Floats:
+        """Reference cue at all samples, and 1; or 0 after the end of the drive, where errors do not count."""
         rows = np.zeros((count * self.options.steps, N_CUES + 1))
         rows[: len(reference), :N_CUES] = reference
         rows[: len(reference), N_CUES] = 1.0
         return rows.ravel()
 
-    def _guess(self, reference: Floats, given: Floats, count: int, start: Start) -> tuple[Floats, int]:
-        """A motion without gaps, and the iterations it took.
+    def _guess(self, reference: Floats, cues: Floats, count: int, start: WindowStart) -> tuple[Floats, int]:
+        """A motion without gaps to begin with, and the iterations it took.
 
-        Standing still for errors as they are. What is sensed begins with the plan for those: from far off,
-        its long memory would bend the way of the iterations.
+        It stands still for the objective J. The perceived objective begins with the optimum of J: from far
+        off, the long memory of the filters would mislead the iterations.
         """
         nodes = np.zeros((count + 1, self._parts.blocks.node_size))
         nodes[:, :N_AXES] = start.position
@@ -214,15 +226,15 @@ class Problem:
         plain = self._plain.solve(reference, replace(start, memory=np.zeros(0)))
         nodes[:, : 2 * N_AXES], nodes[:, -N_AXES:] = np.split(plain.nodes, [2 * N_AXES], axis=1)
         nodes[0, 2 * N_AXES : -N_AXES] = start.memory
-        rows = given.reshape(count, self.options.steps, N_CUES + 1)
+        rows = cues.reshape(count, self.options.steps, N_CUES + 1)
         for k in range(count):
             z = np.concatenate([nodes[k], nodes[k + 1, -N_AXES:]])
             end = np.array(self._parts.blocks.end(z, rows[k].T))[:, 0]
             nodes[k + 1, 2 * N_AXES : -N_AXES] = end[2 * N_AXES :]
         return nodes.ravel(), plain.iterations
 
-    def _bounds(self, count: int, start: Start) -> tuple[Floats, Floats]:
-        """Of the variables: the start is given, carriage and turntable have limits of their own."""
+    def _bounds(self, count: int, start: WindowStart) -> tuple[Floats, Floats]:
+        """Bounds of the variables: the start is given, carriage and turntable have limits of their own."""
         most = np.full((count + 1, self._parts.blocks.node_size), np.inf)
         speed, acceleration = axis_bounds(self._machine, self.margin)
         most[:, N_AXES : 2 * N_AXES] = speed
@@ -233,20 +245,13 @@ class Problem:
         return lower.ravel(), upper.ravel()
 
     def _ranges(self, program: Transcription) -> tuple[Floats, Floats]:
-        """Of the constraints: no gaps, and the limits."""
+        """Ranges of the constraints: no gaps, and the limits."""
         ranges = []
         for limit in (self._parts.lower, self._parts.upper):
             nodes = np.tile(limit, (program.intervals + 1, 1))
             nodes[0, :-_LEG_ACCELERATIONS] = np.sign(limit[-1]) * np.inf
             ranges.append(np.concatenate([np.zeros(program.gaps), nodes.ravel()]))
         return ranges[0], ranges[1]
-
-
-# A drive of any length in windows: each looks ahead beyond what is kept of it.
-#
-# The last window reaches to the end of the drive. Every plan is played through the machine's own step before
-# it is taken; one that meets a limit between nodes is solved anew with a wider margin, one that comes near a
-# singular pose with those forbidden.
 
 
 OnWindow = Callable[[float, int], None]
@@ -256,7 +261,7 @@ _WIDER: Final = 3.0
 
 
 class Window(NamedTuple):
-    """Time steps of a drive: planned from ``first`` to ``last``, kept to ``kept``."""
+    """Time steps of a drive: planned from ``first`` to ``last``, applied up to ``kept``."""
 
     first: int
     kept: int
@@ -276,8 +281,8 @@ def windows(steps: int, options: OptimumOptions, dt: float) -> Iterator[Window]:
 
 
 @dataclass
-class _Tally:
-    """What an account counts; ``played`` holds the cost of every time step, window by window."""
+class _Counts:
+    """Sums of a report; ``played`` holds the cost of every time step, window by window."""
 
     cost: float = 0.0
     windows: int = 0
@@ -297,7 +302,7 @@ class Planner:
         vestibular: The driver's perception.
         cues: The drive, at the machine's time step.
         start: (9,) pose at its first sample.
-        tell: Called with the share of the drive that is planned and IPOPT's iterations in this window.
+        on_window: Called with the share of the drive that is planned and IPOPT's iterations in this window.
     """
 
     def __init__(
@@ -307,26 +312,27 @@ class Planner:
         vestibular: VestibularModel,
         cues: CueTrace,
         start: Floats,
-        tell: OnWindow | None = None,
+        on_window: OnWindow | None = None,
     ) -> None:
         self._options, self._cues, self._start = options, cues, start
         self._player = Player(platform, cues, vestibular, start)
-        self._share, self._tally = 0.0, _Tally()
+        self._share, self._counts = 0.0, _Counts()
         head = platform.cab.head
         force = cues.specific_force if options.objective == "J" else cues.at_point(head)
         self._reference = np.hstack([force, cues.angular_velocity])
         self._zones = np.repeat([options.force_zone, options.rate_zone], 3)
 
-        def told(iterations: int) -> None:
-            if tell is not None:
-                tell(self._share, iterations)
+        def on_iteration(iterations: int) -> None:
+            if on_window is not None:
+                on_window(self._share, iterations)
 
         @cache
-        def problem(margin: float, clear: bool = False) -> Problem:
+        def program(margin: float, clear: bool = False) -> WindowProgram:
             filtered = vestibular if options.objective == "perceived" else None
-            return Problem(platform, options, filtered, cues.dt, margin, clear, told if tell else None)
+            callback = on_iteration if on_window else None
+            return WindowProgram(platform, options, filtered, cues.dt, margin, clear, callback)
 
-        self._problem = problem
+        self._program = program
 
     def plan(self) -> Plan:
         """The plan of the whole drive."""
@@ -336,55 +342,55 @@ class Planner:
         for window in windows(steps, self._options, self._cues.dt):
             self._share = window.first / steps
             played = self._solved(window)
-            self._tally.windows += 1
-            self._tally.played.append(self._costs(played.states))
+            self._counts.windows += 1
+            self._counts.played.append(self._costs(played.states))
             kept.append(played.accelerations)
-        tally = self._tally
-        account = Account(
+        counts = self._counts
+        report = PlanReport(
             objective=self._options.objective,
-            claimed=float((first + tally.cost) / (steps + 1)),
-            played=float((first + np.concatenate(tally.played).sum()) / (steps + 1)),
-            windows=tally.windows,
-            iterations=tally.iterations,
-            widened=tally.widened,
-            unconverged=tally.unconverged,
-            braked=tally.braked,
+            claimed=float((first + counts.cost) / (steps + 1)),
+            played=float((first + np.concatenate(counts.played).sum()) / (steps + 1)),
+            windows=counts.windows,
+            iterations=counts.iterations,
+            widened=counts.widened,
+            unconverged=counts.unconverged,
+            braked=counts.braked,
             seconds=time.perf_counter() - began,
         )
-        return Plan(np.concatenate(kept), self._start, account)
+        return Plan(np.concatenate(kept), self._start, report)
 
-    def _solved(self, window: Window) -> Played:
-        """The kept part of a window; braking where no plan keeps the limits."""
-        tally, options = self._tally, self._options
-        before, begins = self._player.snapshot(), self._begins()
-        ahead = self._reference[window.first + 1 : window.last + 1]
+    def _solved(self, window: Window) -> Playback:
+        """The applied part of a window; braking where no plan keeps the limits."""
+        counts, options = self._counts, self._options
+        before, begins = self._player.snapshot(), self._window_start()
+        reference = self._reference[window.first + 1 : window.last + 1]
         length = window.kept - window.first
         margin, clear = options.margin, False
         for attempt in range(options.widenings + 1):
-            solution = self._problem(margin, clear).solve(ahead, begins)
-            tally.iterations += solution.iterations
+            solution = self._program(margin, clear).solve(reference, begins)
+            counts.iterations += solution.iterations
             played = self._player.play(solution.accelerations[:length])
             if played.clean:
-                tally.unconverged += not solution.converged
-                tally.cost += float(solution.costs[: -(-length // options.steps)].sum())
+                counts.unconverged += not solution.converged
+                counts.cost += float(solution.costs[: -(-length // options.steps)].sum())
                 return played
             self._player.restore(before)
             if played.singular and not clear:
                 clear = True
             else:
                 margin *= _WIDER
-            tally.widened += attempt < options.widenings
-        tally.unconverged += not solution.converged
-        tally.braked += 1
+            counts.widened += attempt < options.widenings
+        counts.unconverged += not solution.converged
+        counts.braked += 1
         played = self._player.brake(length)
-        tally.cost += float(self._costs(played.states).sum())
+        counts.cost += float(self._costs(played.states).sum())
         return played
 
-    def _begins(self) -> Start:
-        """The machine and the driver now."""
-        state, sensed = self._player.state, self._problem(self._options.margin).sensed
+    def _window_start(self) -> WindowStart:
+        """Machine and vestibular filters now."""
+        state, perceived = self._player.state, self._program(self._options.margin).perceived
         memory = np.zeros(0)
-        if sensed is not None:
+        if perceived is not None:
             simulated, reference = state["simulator_cue"], state["reference_cue"]
             difference = (
                 simulated["head_force"] - reference["head_force"],
@@ -395,14 +401,13 @@ class Planner:
                 state["vestibular_simulator"]["otoliths"] - state["vestibular_reference"]["otoliths"],
                 state["vestibular_simulator"]["canals"] - state["vestibular_reference"]["canals"],
             )
-            memory = sensed.ahead(np.vstack(filters) / self._zones[:, None], error)
-        return Start(self._player.positions(), self._player.rates(), memory)
+            memory = perceived.next_state(np.vstack(filters) / self._zones[:, None], error)
+        return WindowStart(self._player.positions(), self._player.rates(), memory)
 
     def _costs(self, states: NDArray[np.void]) -> Floats:
         """(n,) squared errors of the cues, or of the perceived cues, in indifference zones."""
-        perceived = self._options.objective == "perceived"
-        simulated = states["perceived_simulator" if perceived else "simulator_cue"]
-        reference = states["perceived_reference" if perceived else "reference_cue"]
+        kind = ("perceived_simulator", "perceived_reference"), ("simulator_cue", "reference_cue")
+        simulated, reference = (states[name] for name in kind[self._options.objective == "J"])
         errors = (
             np.hstack([simulated["force"] - reference["force"], simulated["rate"] - reference["rate"]])
             / self._zones

@@ -1,9 +1,19 @@
-"""What a way of searching is: steps, and now and then a trial on all drives, where results come from."""
+"""Methods of a search: CMA-ES, and Adam along the gradient of J through washout and machine.
+
+Both work in the unit cube of a :class:`~.space.WashoutSpace`, on a few drives at a time. Every
+:data:`TRY_EVERY` steps they evaluate their best on all drives (a trial); only trials can be the result.
+
+**CMA-ES** (Hansen and Ostermeier 2001, by the package ``cma``): a generation of sets, each through all drives
+of the step in one launch.
+
+**Adam** (Kingma and Ba 2015) with the gradient from Warp's tape. J does not show a limit before it is met. So
+a set that is no better in a trial than the best goes back there, with half the step.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import warp as wp
@@ -11,10 +21,8 @@ from numpy.lib.recfunctions import structured_to_unstructured
 from numpy.typing import NDArray
 
 from ...envs.settings import NonNegative, configuration
-from ..washout import WashoutParameters
 from ..washout.batch import WashoutBatch
-from ..washout.kernels.blocks import Parameters
-from ..washout.policy import kernel_parameters
+from ..washout.families import family_of
 from .objective import Objective
 from .space import WashoutSpace
 
@@ -25,13 +33,13 @@ TRY_EVERY: Final = 5
 
 
 @configuration
-class Found:
-    """What a step or a trial found; a search is repeated from these to the same bits.
+class StepResult:
+    """Result of a step or a trial; a search is repeated from these to the same bits.
 
     Args:
-        hours: Simulated for it, h.
-        values: Costs of the sets that were tried, or what else the method needs.
-        violations: Of a trial: the share of time each set is at a limit where none may be met.
+        hours: Time simulated for it, h.
+        values: Costs of the evaluated sets; for a gradient J and its derivatives.
+        violations: Of a trial: share of time of each set at a limit where none may be met.
     """
 
     hours: NonNegative
@@ -40,7 +48,13 @@ class Found:
 
 
 class Method(ABC):
-    """A search step by step, the first of which is a trial; everything it draws comes from its seed."""
+    """A search step by step, the first of which is a trial; every draw follows from its seed.
+
+    Attributes:
+        label: Name in the checksum of a search, which must not change.
+    """
+
+    label: ClassVar[str]
 
     def __init__(self) -> None:
         self._count = 0
@@ -48,7 +62,7 @@ class Method(ABC):
 
     @property
     def best(self) -> tuple[float, Floats] | None:
-        """Cost of the best set on all drives and its place in the unit cube; None before the first.
+        """Cost of the best set on all drives and its place in the unit cube; None before the first trial.
 
         A set that meets a limit where none may be met is never better than one that does not, whatever they
         cost.
@@ -57,33 +71,33 @@ class Method(ABC):
 
     @property
     def tried(self) -> bool:
-        """Whether what was found last has been tried on all drives."""
+        """Whether the last steps have been followed by a trial."""
         return self._count % (TRY_EVERY + 1) == 1
 
     @property
     @abstractmethod
     def converged(self) -> bool:
-        """Whether more steps would find nothing."""
+        """Whether further steps would gain nothing."""
 
     @property
     def settings(self) -> dict[str, object]:
-        """What is fixed about it and decides what it finds, versions of libraries included."""
-        return {"method": type(self).__name__, "try_every": TRY_EVERY}
+        """Constants that its results depend on, versions of libraries included."""
+        return {"method": self.label, "try_every": TRY_EVERY}
 
-    def measure(self, space: WashoutSpace, objective: Objective) -> Found:
-        """Try what is to be tried next, on all drives if it is its turn."""
+    def evaluate(self, space: WashoutSpace, objective: Objective) -> StepResult:
+        """Simulate the next step or trial."""
         return self._trial(space, objective) if self._tries else self._step(space, objective)
 
-    def tell(self, found: Found) -> None:
-        """Take in what was found, now or in an earlier session.
+    def update(self, result: StepResult) -> None:
+        """Take in a result, of now or of an earlier session.
 
         Raises:
-            ValueError: it is not what :meth:`measure` gives here.
+            ValueError: it is not a result of :meth:`evaluate` at this point.
         """
         if self._tries:
-            self._compare(found)
+            self._compare(result)
         else:
-            self._move(found.values)
+            self._move(result.values)
         self._count += 1
 
     @property
@@ -91,7 +105,7 @@ class Method(ABC):
         return self._count % (TRY_EVERY + 1) == 0
 
     def _improves(self, violation: float, cost: float, place: Floats) -> bool:
-        """Whether a set is better than all before; if so, it is kept."""
+        """Whether a set is better than all before; if so, it becomes the best."""
         rank = (violation > 0.0, cost)
         if self._best is not None and rank >= self._best[:2]:
             return False
@@ -99,30 +113,24 @@ class Method(ABC):
         return True
 
     @abstractmethod
-    def _trial(self, space: WashoutSpace, objective: Objective) -> Found:
+    def _trial(self, space: WashoutSpace, objective: Objective) -> StepResult:
         """Costs and violations on all drives."""
 
     @abstractmethod
-    def _compare(self, found: Found) -> None:
-        """Take in a trial."""
+    def _compare(self, result: StepResult) -> None:
+        """Update with a trial."""
 
     @abstractmethod
-    def _step(self, space: WashoutSpace, objective: Objective) -> Found:
-        """What the next move needs to know."""
+    def _step(self, space: WashoutSpace, objective: Objective) -> StepResult:
+        """Values for the next move."""
 
     @abstractmethod
     def _move(self, values: tuple[float, ...]) -> None:
-        """Take in a step."""
-
-
-# CMA-ES: whole generations of parameter sets, each through all drives in one launch.
-#
-# Hansen and Ostermeier, "Completely Derandomized Self-Adaptation in Evolution Strategies", in the
-# implementation of the package ``cma``.
+        """Update with the values of a step."""
 
 
 STEP: Final = 0.12
-"""Standard deviation of the first generation, of the unit cube."""
+"""Standard deviation of the first generation, in the unit cube."""
 DRIVES: Final = 24
 """Drives of a generation, drawn anew for each, the same for all its sets."""
 GUARDS: Final = 24
@@ -131,19 +139,21 @@ _MARGIN: Final = 0.02
 """The start's least distance from the faces of the cube, so that the first spread is not cut there."""
 
 
-class Evolution(Method):
+class CmaEs(Method):
     """CMA-ES in the unit cube.
 
-    Now and then the middle of the distribution and the best of the last generation are tried on all drives.
-    Only these can be the result; and drives in which they meet a limit guard all later generations.
+    A trial has the mean of the distribution and the best of the last generation. Drives in which they meet a
+    limit guard all later generations.
 
     Args:
         start: (dimension,) where to begin; the first to be tried.
         seed: Of all that is drawn.
     """
 
+    label = "Evolution"
+
     def __init__(self, start: Floats, seed: int) -> None:
-        # Not with the module: the package is loaded only by who tunes.
+        # Imported here, so that only a search loads the package.
         import cma
 
         super().__init__()
@@ -157,12 +167,12 @@ class Evolution(Method):
         self._strategy = cma.CMAEvolutionStrategy(np.clip(start, _MARGIN, 1.0 - _MARGIN), STEP, options)
         self._seed, self._version = seed, str(cma.__version__)
         self._limited = np.zeros(0)
-        self._tried = [np.array(start)]
-        self._asked = self._ask()
+        self._candidates = [np.array(start)]
+        self._generation = self._draw()
 
     @property
     def converged(self) -> bool:
-        """Whether one of the strategy's own criteria says so."""
+        """Whether a criterion of the strategy is met."""
         return bool(self._strategy.stop())
 
     @property
@@ -176,46 +186,41 @@ class Evolution(Method):
         worst = np.argsort(-self._limited, kind="stable")[:GUARDS]
         return [int(i) for i in worst if self._limited[i] > 0.0]
 
-    def _trial(self, space: WashoutSpace, objective: Objective) -> Found:
-        """Costs and violations of what is tried; behind the costs the time at a limit in each drive."""
-        whole = objective.judge([space.decode(place) for place in self._tried])
+    def _trial(self, space: WashoutSpace, objective: Objective) -> StepResult:
+        """Costs and violations of the candidates; behind the costs the time at a limit in each drive."""
+        whole = objective.evaluate([space.decode(place) for place in self._candidates])
         limited = whole.limited.sum(axis=0)
-        return Found(
-            objective.hours() * len(self._tried),
+        return StepResult(
+            objective.hours() * len(self._candidates),
             (*whole.cost.tolist(), *limited.tolist()),
             tuple(whole.violation.tolist()),
         )
 
-    def _compare(self, found: Found) -> None:
-        split = len(self._tried)
-        for cost, violation, place in zip(found.values[:split], found.violations, self._tried, strict=True):
+    def _compare(self, result: StepResult) -> None:
+        split = len(self._candidates)
+        for cost, violation, place in zip(
+            result.values[:split], result.violations, self._candidates, strict=True
+        ):
             self._improves(violation, cost, place)
-        limited = np.array(found.values[split:])
+        limited = np.array(result.values[split:])
         self._limited = limited + (self._limited if len(self._limited) else 0.0)
 
-    def _step(self, space: WashoutSpace, objective: Objective) -> Found:
+    def _step(self, space: WashoutSpace, objective: Objective) -> StepResult:
         """Costs of a generation."""
         drawn = objective.draw(DRIVES, (self._seed, self._count))
         guards = [i for i in self._guards if i not in drawn]
-        cost = objective.judge([space.decode(place) for place in self._asked], drawn, guards).cost
-        return Found(objective.hours([*drawn, *guards]) * len(self._asked), tuple(cost.tolist()))
+        cost = objective.evaluate([space.decode(place) for place in self._generation], drawn, guards).cost
+        return StepResult(objective.hours([*drawn, *guards]) * len(self._generation), tuple(cost.tolist()))
 
     def _move(self, values: tuple[float, ...]) -> None:
         """Select, adapt, and draw the next generation."""
-        self._strategy.tell(self._asked, list(values))
-        fittest = self._asked[int(np.argmin(values))]
-        self._tried = [np.asarray(self._strategy.result.xfavorite), fittest]
-        self._asked = self._ask()
+        self._strategy.tell(self._generation, list(values))
+        fittest = self._generation[int(np.argmin(values))]
+        self._candidates = [np.asarray(self._strategy.result.xfavorite), fittest]
+        self._generation = self._draw()
 
-    def _ask(self) -> list[Floats]:
+    def _draw(self) -> list[Floats]:
         return [np.asarray(place) for place in self._strategy.ask()]
-
-
-# Descent along the gradient of J through washout and machine, by Warp's tape.
-#
-# Adam (Kingma and Ba, "Adam: A Method for Stochastic Optimization") on a few drives at a time. J says
-# nothing of a limit before it is met: now and then the set is tried on all drives, and one that is no better
-# than the best goes back there with half the step.
 
 
 DESCENT_STEP: Final = 0.02
@@ -225,33 +230,35 @@ SMALLEST_DESCENT_STEP: Final = 1e-4
 DESCENT_DRIVES: Final = 32
 """Drives of one gradient, drawn anew each time."""
 _DECAY: Final = (0.8, 0.95)
-"""Of Adam's two moments: a search has some hundred steps, not a million."""
+"""Decay of Adam's two moments: a search has some hundred steps, not a million."""
 _TINY: Final = 1e-8
 _DIFFERENCE: Final = 1e-5
 """Half the difference from which the derivative of the kernel's parameters by place is taken."""
 
 
-class Descent(Method):
-    """Adam in the unit cube, held to what is no worse on all drives.
+class GradientDescent(Method):
+    """Adam in the unit cube; a trial that is no better than the best goes back there.
 
     Args:
         start: (dimension,) where to begin.
         seed: Of the drives that are drawn.
     """
 
+    label = "Descent"
+
     def __init__(self, start: Floats, seed: int) -> None:
         super().__init__()
         self._seed = seed
         self._place = np.array(start)
         self._length = DESCENT_STEP
-        self._forget()
+        self._reset_moments()
 
-    def _forget(self) -> None:
+    def _reset_moments(self) -> None:
         self._mean, self._square, self._since = np.zeros_like(self._place), np.zeros_like(self._place), 0
 
     @property
     def converged(self) -> bool:
-        """Whether the steps have become too small to matter."""
+        """Whether the step is below its least size."""
         return self._length < SMALLEST_DESCENT_STEP
 
     @property
@@ -264,23 +271,23 @@ class Descent(Method):
             "difference": _DIFFERENCE,
         }
 
-    def _trial(self, space: WashoutSpace, objective: Objective) -> Found:
-        whole = objective.judge([space.decode(self._place)])
-        return Found(objective.hours(), tuple(whole.cost.tolist()), tuple(whole.violation.tolist()))
+    def _trial(self, space: WashoutSpace, objective: Objective) -> StepResult:
+        whole = objective.evaluate([space.decode(self._place)])
+        return StepResult(objective.hours(), tuple(whole.cost.tolist()), tuple(whole.violation.tolist()))
 
-    def _compare(self, found: Found) -> None:
-        """Go back to the best, with half the step, from what is no better."""
-        (cost,), (violation,) = found.values, found.violations
+    def _compare(self, result: StepResult) -> None:
+        """Go back to the best, with half the step, from a set that is no better."""
+        (cost,), (violation,) = result.values, result.violations
         if not self._improves(violation, cost, self._place) and self.best is not None:
             self._place = self.best[1].copy()
             self._length *= 0.5
-            self._forget()
+            self._reset_moments()
 
-    def _step(self, space: WashoutSpace, objective: Objective) -> Found:
+    def _step(self, space: WashoutSpace, objective: Objective) -> StepResult:
         """J and its gradient on a few of the drives."""
         drawn = objective.draw(DESCENT_DRIVES, (self._seed, self._count))
         cost, gradient = place_gradient(space, self._place, objective, drawn)
-        return Found(objective.hours(drawn), (cost, *gradient.tolist()))
+        return StepResult(objective.hours(drawn), (cost, *gradient.tolist()))
 
     def _move(self, values: tuple[float, ...]) -> None:
         """One step of Adam."""
@@ -302,7 +309,7 @@ def place_gradient(
         space: The unit cube.
         place: (dimension,) in it.
         objective: Has machine and drives.
-        drawn: Which drives; of those of different length as much as the shortest has.
+        drawn: Indices of the drives; all are cut to the length of the shortest.
     """
     drives = [objective.drives[i] for i in drawn]
     batch = WashoutBatch([space.decode(place)], drives, objective.platform)
@@ -326,10 +333,9 @@ def _kernel_slopes(space: WashoutSpace, place: Floats, objective: Objective) -> 
 
 
 def _kernel_values(space: WashoutSpace, place: Floats, objective: Objective) -> Floats:
-    decoded = space.decode(place)
-    assert isinstance(decoded, WashoutParameters), "the options of a search refuse other families"
-    parameters = kernel_parameters(decoded, objective.platform.cab)
-    values: Floats = _flat(wp.array([parameters], dtype=Parameters, device="cpu").numpy())[0]
+    kernels = family_of(space.start).kernels
+    parameters = kernels.values(space.decode(place), objective.platform.cab, objective.drives[0].dt)
+    values: Floats = _flat(wp.array([parameters], dtype=kernels.parameters, device="cpu").numpy())[0]
     return values
 
 

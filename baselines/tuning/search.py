@@ -1,4 +1,8 @@
-"""Everything that can be chosen about a search."""
+"""A search for the parameters of a washout: its options, its steps up to a budget, and its file.
+
+The file is written after every step. A search that was interrupted goes through its steps again without
+simulating, and ends with the same bits.
+"""
 
 from __future__ import annotations
 
@@ -14,43 +18,43 @@ from pydantic import Field
 
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.maneuvers import RandomDrives, drive_seeds
-from ...envs.settings import Positive, configuration, from_dict, to_dict
+from ...envs.settings import Positive, configuration, from_dict, renamed, to_dict
 from ...envs.storage import write_text
-from ..washout.families import AnyWashout, algorithm_of
-from .methods import Descent, Evolution, Found, Method
+from ..washout.families import AnyWashout, family_of
+from .methods import CmaEs, GradientDescent, Method, StepResult
 from .objective import LIMIT_SLOPE, LIMIT_STEP, Measure, Objective
 from .space import WashoutSpace
 
 TRAIN: Final = "train"
-"""Stands for random drives; the standard maneuvers are for evaluation."""
+"""Name of the random drives; the standard maneuvers are for evaluation."""
 HELD_OUT_SEED: Final = 1_000_000
-"""Of the random drives a search never sees: those that agents are validated on."""
+"""Seed of the random drives that no search sees: those that agents are validated on."""
 HELD_OUT: Final = 64
 """Their number."""
 
 ROADS: Final = RandomDrives(urban=0.3, rural=0.2, highway=0.1, track=0.4)
-"""What the shipped agents are trained on: fierce drives are many, because maneuvers are fierce."""
+"""Roads that the shipped agents are trained on; many are tracks, as the standard maneuvers are hard, too."""
 
 Count = Annotated[int, Field(ge=0, lt=2**32)]
 
 
 @configuration
 class TuningOptions:
-    """A search; with its drives and its machine it determines the result.
+    """Options of a search; with its drives and its machine they determine the result.
 
     Args:
-        start: Where it begins, and what it leaves as it is: orders of filters, blocks that are off.
-        objective: J, or J of what the driver senses.
+        start: Set to begin with. Orders of filters and blocks that are off stay as in it.
+        objective: J, or perceived J.
         method: "cma", or "gradient" through the machine's own equations, for a classical washout.
         maneuvers: "train" for random drives, or names of maneuvers and recordings.
-        limits: Where no limit may be met: in "all" drives, or on "roads", which spares the random drives on a
-            track; a set that takes the fiercest of them without a limit is a timid one on every road.
+        limits: Drives in which no limit may be met: "all", or "roads", which exempts the random drives on a
+            track. A set that takes the hardest of those without a limit is a timid one on every road.
         drives: Number of random drives, if any.
-        duration: Of each, s.
-        roads: What the random drives are drawn from.
-        drives_seed: Of the random drives; the one that agents are trained with unless told otherwise.
+        duration: Length of each, s.
+        roads: Distribution of the random drives.
+        drives_seed: Seed of the random drives; the default is that of the agents' training.
         budget: Time to simulate, h.
-        seed: Of everything else that is drawn.
+        seed: Seed of every other draw.
     """
 
     start: AnyWashout
@@ -68,14 +72,11 @@ class TuningOptions:
     def __post_init__(self) -> None:
         if self.method == "gradient" and self.objective != "J":
             raise ConfigurationError("objective perceived has no gradient; use method cma")
-        if self.method == "gradient" and algorithm_of(self.start) != "classical":
-            raise ConfigurationError("only the classical washout has a gradient; use method cma")
+        if self.method == "gradient" and family_of(self.start).kernels.act is None:
+            raise ConfigurationError(f"{family_of(self.start).title} has no gradient; use method cma")
         seen = drive_seeds(self.drives, self.drives_seed) if TRAIN in self.maneuvers else []
         if set(seen) & set(drive_seeds(HELD_OUT, HELD_OUT_SEED)):
             raise ConfigurationError(f"drives_seed {self.drives_seed} gives drives that are held out")
-
-
-# A search from its beginning or from its file to the end of its budget.
 
 
 _ANEW: Final = "begin anew: delete it, or name another --out"
@@ -83,31 +84,31 @@ _ANEW: Final = "begin anew: delete it, or name another --out"
 
 @configuration
 class Record:
-    """What the file of a search holds: enough to repeat it to the same bits without simulating anything.
+    """The file of a search: enough to repeat it to the same bits without simulating.
 
     Args:
         options: Of the search.
         platform: Name or file of the machine.
         car: Name or file of the car.
-        inputs: Checksum of all that must be the same for that, see :func:`checksum`.
-        found: What its steps found.
-        command: That began it, for people.
+        inputs: Checksum of everything the results depend on, see :func:`checksum`.
+        results: Results of its steps.
+        command: Command that began it, for people.
     """
 
     options: TuningOptions
     platform: str
     car: str
     inputs: str
-    found: tuple[Found, ...] = ()
+    results: Annotated[tuple[StepResult, ...], renamed("results", "found")] = ()
     command: str = ""
 
 
 @dataclass(frozen=True)
 class Status:
-    """How far a search is.
+    """Progress of a search.
 
     Args:
-        hours: Simulated so far, h.
+        hours: Time simulated so far, h.
         best: Lowest cost so far; None before the first.
         steps: Generations, or gradients and trials.
     """
@@ -122,10 +123,10 @@ class Search:
 
     Args:
         options: Of the search.
-        objective: What it minimizes; its drives are those of the options.
-        names: Of platform and car, as the file holds them.
+        objective: Its objective; the drives are those of the options.
+        names: Names of platform and car, as the file holds them.
         path: File that is written after every step; None for none.
-        command: That begins it, for people.
+        command: Command that begins it, for people.
     """
 
     def __init__(
@@ -138,7 +139,7 @@ class Search:
     ) -> None:
         self.options, self.objective, self.path, self.command = options, objective, path, command
         self.space = WashoutSpace(options.start)
-        self.found: list[Found] = []
+        self.results: list[StepResult] = []
         self._method = _method(options, self.space)
         self._names, self._inputs = names, checksum(options, objective, self.space, self._method)
 
@@ -155,45 +156,47 @@ class Search:
                 "another --out"
             )
         try:
-            for found in record.found:
-                self._take(found)
+            for result in record.results:
+                self._take(result)
         except ValueError as error:
             raise DataError(f"the record of this search does not fit its options ({error})") from None
 
     def run(
-        self, tell: Callable[[Status], None] = lambda status: None, stop: Callable[[], bool] = lambda: False
+        self,
+        on_step: Callable[[Status], None] = lambda status: None,
+        stop: Callable[[], bool] = lambda: False,
     ) -> bool:
-        """Search until the budget is spent or nothing more is found, and what was found last is tried.
+        """Search until the budget is spent or the method has converged, up to the next trial.
 
         Returns:
             Whether ``stop`` ended it.
         """
-        tell(self.status)
+        on_step(self.status)
         while not (self._at_its_end and self._method.tried):
             if stop():
                 return True
-            self._take(self._method.measure(self.space, self.objective))
+            self._take(self._method.evaluate(self.space, self.objective))
             self.save()
-            tell(self.status)
+            on_step(self.status)
         return False
 
-    def _take(self, found: Found) -> None:
-        self._method.tell(found)
-        self.found.append(found)
+    def _take(self, result: StepResult) -> None:
+        self._method.update(result)
+        self.results.append(result)
 
     @property
     def status(self) -> Status:
-        """How far it is."""
+        """Progress so far."""
         best = self._method.best
-        hours = sum(found.hours for found in self.found)
-        return Status(hours, None if best is None else best[0], len(self.found))
+        hours = sum(result.hours for result in self.results)
+        return Status(hours, None if best is None else best[0], len(self.results))
 
     @property
     def _at_its_end(self) -> bool:
         return self.status.hours >= self.options.budget or self._method.converged
 
     def result(self, name: str, description: str) -> AnyWashout:
-        """The best set found, or the start before the first step."""
+        """The best set, or the start before the first trial."""
         best = self._method.best
         place = self.space.encode(self.options.start) if best is None else best[1]
         return self.space.result(place, name, description)
@@ -201,7 +204,7 @@ class Search:
     def save(self) -> None:
         """Write the file, whole or not at all."""
         if self.path is not None:
-            record = Record(self.options, *self._names, self._inputs, tuple(self.found), self.command)
+            record = Record(self.options, *self._names, self._inputs, tuple(self.results), self.command)
             write_text(self.path, json.dumps(to_dict(record)) + "\n")
 
 
@@ -222,22 +225,22 @@ def load_record(path: Path) -> Record:
     try:
         return from_dict(Record, values, str(path))
     except ConfigurationError as error:
-        told, *others = str(error).removeprefix(f"{path}: ").split("; ")
+        first, *others = str(error).removeprefix(f"{path}: ").split("; ")
         more = f", and {len(others)} more" if others else ""
-        raise DataError(f"{path}: no search of this version ({told}{more}); {_ANEW}") from None
+        raise DataError(f"{path}: no search of this version ({first}{more}); {_ANEW}") from None
 
 
 def checksum(options: TuningOptions, objective: Objective, space: WashoutSpace, method: Method) -> str:
-    """SHA-256 of what decides what the steps of a search find and mean.
+    """SHA-256 of everything that the results of a search depend on.
 
     Every option but the budget, which may be extended; drives and where limits may be met in them, the
-    machine, what costs, every coordinate with its range, the constants of the method, and versions.
+    machine, the penalty, every coordinate with its range, the constants of the method, and versions.
     """
     parts = {
         "package": _version(),
         "options": to_dict(replace(options, budget=1.0)),
         "drives": [drive.digest() for drive in objective.drives],
-        "spared": sorted(objective.spared),
+        "spared": sorted(objective.exempt),
         "machine": to_dict(objective.platform),
         "limits": [LIMIT_STEP, LIMIT_SLOPE],
         "space": [to_dict(coordinate) for coordinate in space.coordinates],
@@ -247,7 +250,7 @@ def checksum(options: TuningOptions, objective: Objective, space: WashoutSpace, 
 
 
 def _version() -> str:
-    """Of this package; from a folder that was not installed it has none."""
+    """Version of this package; empty in a folder that was not installed."""
     try:
         return version("motion-cueing-gym")
     except PackageNotFoundError:
@@ -257,5 +260,5 @@ def _version() -> str:
 def _method(options: TuningOptions, space: WashoutSpace) -> Method:
     begin = space.encode(options.start)
     if options.method == "gradient":
-        return Descent(begin, options.seed)
-    return Evolution(begin, options.seed)
+        return GradientDescent(begin, options.seed)
+    return CmaEs(begin, options.seed)

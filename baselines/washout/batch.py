@@ -19,9 +19,9 @@ from ...envs.platform.kernels.step import SetPoint
 from ...envs.simulator.kernels.gradient import add_cue_error, step_with_adjoint
 from ...envs.simulator.kernels.step import CueCost, State, zone
 from ...envs.simulator.simulator import Simulator
-from .kernels.blocks import Memory
-from .kernels.launch import Score, act
-from .policy import CLASSICAL, Family, FamilyParameters, start_pose
+from .families import FamilyParameters, family_of
+from .kernels.launch import Score
+from .policy import start_pose
 
 Floats = NDArray[np.float64]
 
@@ -45,10 +45,9 @@ class WashoutBatch:
     """Every parameter set on every drive: one environment for each pair.
 
     Args:
-        sets: Parameter sets.
+        sets: Parameter sets of one family.
         drives: Cue traces of the same time step.
         platform: The machine, without lag or dead time.
-        family: The algorithm the sets are of.
 
     Raises:
         ConfigurationError: the machine has a lag or a dead time, which one fused launch does not simulate.
@@ -59,7 +58,6 @@ class WashoutBatch:
         sets: Sequence[FamilyParameters],
         drives: Sequence[CueTrace],
         platform: Platform,
-        family: Family = CLASSICAL,
     ) -> None:
         if not sets or not drives:
             raise ConfigurationError("a washout batch needs at least one parameter set and one drive")
@@ -70,9 +68,10 @@ class WashoutBatch:
             raise ConfigurationError(
                 "actuator dynamics must be unity in a washout batch; use rollout instead"
             )
-        self.family = family
-        values = [family.values(p, platform.cab, self.simulator.dt) for p in sets]
-        self.parameters = wp.array(values, dtype=family.parameters, requires_grad=family is CLASSICAL)
+        self.family = family_of(sets[0])
+        self.kernels = kernels = self.family.kernels
+        values = [kernels.values(p, platform.cab, self.simulator.dt) for p in sets]
+        self.parameters = wp.array(values, dtype=kernels.parameters, requires_grad=kernels.act is not None)
         self.parameters_of = wp.array(np.repeat(np.arange(len(sets)), len(drives)), dtype=int)
         self.simulator.reset(np.repeat([start_pose(p) for p in sets], len(drives), axis=0))
 
@@ -93,9 +92,9 @@ class WashoutBatch:
             first, last = int(bounds[part]), int(bounds[part + 1])
             inputs = [*simulator.constants, simulator.delay_array, self.parameters, self.parameters_of]
             inputs += [zone(cost or CueCost()), simulator.state_array, first]
-            wp.launch(self.family.drive_through, last - first, inputs=inputs, outputs=[score], device="cpu")
+            wp.launch(self.kernels.drive_through, last - first, inputs=inputs, outputs=[score], device="cpu")
 
-        self.family.drive_through.module.load(simulator.device)
+        self.kernels.drive_through.module.load(simulator.device)
         with ThreadPoolExecutor(len(bounds) - 1) as pool:
             list(pool.map(launch, range(len(bounds) - 1)))
         values = score.numpy()
@@ -110,15 +109,15 @@ class WashoutBatch:
             (sets,) costs and (sets,) structured gradients with the fields of the kernel's ``Parameters``.
 
         Raises:
-            ConfigurationError: there is not one step, or the algorithm is not the classical one.
+            ConfigurationError: there is not one step, or the algorithm has no gradient.
         """
-        if self.family is not CLASSICAL:
-            raise ConfigurationError("only the classical washout has a gradient; use method cma")
+        if self.kernels.act is None:
+            raise ConfigurationError(f"{self.family.title} has no gradient; use method cma")
         if steps < 1:
             raise ConfigurationError(f"steps must be at least 1, found {steps}")
         n, keep = self.simulator.n, {"requires_grad": True}
         states = [wp.zeros(n, dtype=State, **keep) for _ in range(steps + 1)]
-        memories = [wp.zeros(n, dtype=Memory, **keep) for _ in range(steps + 1)]
+        memories = [wp.zeros(n, dtype=self.kernels.memory, **keep) for _ in range(steps + 1)]
         actions = [wp.zeros(n, dtype=vec9, **keep) for _ in range(steps)]
         costs = wp.zeros(n, dtype=real, **keep)
         wp.copy(states[0], self.simulator.state_array)
@@ -134,7 +133,7 @@ class WashoutBatch:
         delay = wp.zeros((simulator.n, 1), dtype=SetPoint)
         for k in range(len(actions)):
             wp.launch(
-                act,
+                self.kernels.act,
                 simulator.n,
                 inputs=[
                     self.parameters,

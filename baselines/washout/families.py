@@ -1,133 +1,159 @@
-"""The washouts by algorithm: parameter sets of any family by name or file, and their policies."""
+"""Washout families by name: what one declares, how it is registered, and parameter sets of any of them.
+
+A family is a motion cueing algorithm of filters: classical, adaptive, optimal. Its folder declares everything
+in one :class:`Family`: parameters, kernels, presets, and the coordinates of a search. One registration adds
+it to policies, presets, batches and tuning::
+
+    register_family("mine", "my_package.my_washout:FAMILY", "my washout")
+
+An installed package does the same by an entry point of the group ``motion_cueing.washouts``. A parameter file
+names its family as ``algorithm``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol, TypeAlias
 
-from pydantic import Discriminator, Tag
+from pydantic import PlainValidator
 
-from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError, UnknownNameError
-from ...envs.platform.machines import Cab, Platform
-from ...envs.settings import configuration, from_dict, read_yaml
-from ...envs.simulator.simulator import TIME_STEP
-from ..policy import Policy
-from ..presets import named
-from .adaptive import AdaptiveParameters, AdaptiveWashout, adaptive_presets, load_adaptive
-from .adaptive.policy import ADAPTIVE
-from .optimal import OptimalParameters, OptimalWashout, load_optimal, optimal_presets
-from .optimal.policy import OPTIMAL
-from .parameters import WashoutParameters, load_washout, washout_presets
-from .policy import CLASSICAL, ClassicalWashout, Family
+from ...envs.registry import Registry
+from ...envs.settings import Vector2, Vector3, configuration, from_dict, load, read_yaml
+from ..presets import named, preset_names
+from .kernels.launch import Kernels
+
+
+class FamilyParameters(Protocol):
+    """A parameter set of any family; a configuration. Those of other families have a field ``algorithm``."""
+
+    @property
+    def name(self) -> str:
+        """Name of the set."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """One line for people."""
+        ...
+
+    @property
+    def turntable_share(self) -> float:
+        """k_T: 1 turns the cab with the turntable, 0 with the hexapod."""
+        ...
+
+    @property
+    def start_carriage(self) -> Vector2:
+        """Where the carriage begins a drive, m."""
+        ...
+
+    @property
+    def start_hexapod(self) -> Vector3:
+        """Where the hexapod begins a drive, m from neutral."""
+        ...
+
+
+@configuration
+class Coordinate:
+    """One number that a search may change.
+
+    Args:
+        path: Its place in the parameters, as "hps.0.frequency".
+        low: Smallest value, in the unit of the parameter.
+        high: Largest value.
+        log: Whether equal steps are equal factors.
+    """
+
+    path: str
+    low: float
+    high: float
+    log: bool = True
+
+    def value(self, place: float) -> float:
+        """The value at a place between 0 (``low``) and 1 (``high``)."""
+        inside = min(max(float(place), 0.0), 1.0)
+        if self.log:
+            return float(self.low * (self.high / self.low) ** inside)
+        return self.low + (self.high - self.low) * inside
+
+    def place(self, value: float) -> float:
+        """The place of a value; values outside of the range at its nearer end."""
+        inside = min(max(value, self.low), self.high)
+        if self.log:
+            return math.log(inside / self.low) / math.log(self.high / self.low)
+        return (inside - self.low) / (self.high - self.low)
+
+
+def coordinates(path: str, count: int, bounds: tuple[float, float], log: bool = True) -> list[Coordinate]:
+    """Coordinates of several axes with the same range; ``{}`` in the path is the axis."""
+    return [Coordinate(path.format(axis), *bounds, log) for axis in range(count)]
+
+
+@dataclass(frozen=True)
+class Family:
+    """A washout algorithm.
+
+    Args:
+        name: Name in files (``algorithm``) and commands.
+        title: Name in sentences: "the adaptive washout".
+        parameters: Configuration class of its parameter sets.
+        kernels: Warp kernels, see :func:`.kernels.launch.make_kernels`.
+        presets: Folder of its parameter sets, one YAML file each.
+        start: Preset that is set by hand: the default, and where a search begins.
+        coordinates: Numbers that a search may change.
+    """
+
+    name: str
+    title: str
+    parameters: type[Any]
+    kernels: Kernels
+    presets: Path
+    start: str
+    coordinates: tuple[Coordinate, ...]
+
+
+FAMILIES: Final[Registry[Family]] = Registry("algorithm", "motion_cueing.washouts")
+"""Every family by name."""
+
+
+def register_family(name: str, family: Family | str, description: str = "") -> None:
+    """Add a family.
+
+    Args:
+        name: ``Family.name``.
+        family: The family, or ``"module:attribute"`` where to find it.
+        description: One line for lists.
+    """
+    FAMILIES.register(name, family, description)
+
+
+register_family("classical", f"{__package__}.classical.family:FAMILY", "the classical washout")
+register_family("adaptive", f"{__package__}.adaptive.family:FAMILY", "the adaptive washout")
+register_family("optimal", f"{__package__}.optimal.family:FAMILY", "the optimal washout")
 
 
 def algorithm_of(parameters: Any) -> str:
-    """Name of the family that a parameter set, or the values of one in a file, belong to."""
+    """Name of the family of a parameter set, or of the values of one in a file; default: classical."""
     if isinstance(parameters, dict):
         return str(parameters.get("algorithm", "classical"))
     return str(getattr(parameters, "algorithm", "classical"))
 
 
-AnyWashout: TypeAlias = Annotated[
-    Annotated[WashoutParameters, Tag("classical")]
-    | Annotated[AdaptiveParameters, Tag("adaptive")]
-    | Annotated[OptimalParameters, Tag("optimal")],
-    Discriminator(algorithm_of),
-]
-"""A parameter set of any family."""
-
-
-@dataclass(frozen=True)
-class Algorithm:
-    """One family, for people and searches.
-
-    Args:
-        description: What it is called in a sentence.
-        start: The preset that is set by hand.
-        parameters: Class of its parameter sets.
-        kernels: It as kernels.
-        presets: Names of its shipped sets.
-        load: A set by preset name.
-        make: The policy of a set on a machine.
-    """
-
-    description: str
-    start: str
-    parameters: type[Any]
-    kernels: Family
-    presets: Callable[[], list[str]]
-    load: Callable[[str], AnyWashout]
-    make: Callable[[Any, Cab], Policy]
-
-
-ALGORITHMS: Final[Mapping[str, Algorithm]] = {
-    "classical": Algorithm(
-        "the classical washout",
-        "classical",
-        WashoutParameters,
-        CLASSICAL,
-        washout_presets,
-        load_washout,
-        ClassicalWashout,
-    ),
-    "adaptive": Algorithm(
-        "the adaptive washout",
-        "adaptive",
-        AdaptiveParameters,
-        ADAPTIVE,
-        adaptive_presets,
-        load_adaptive,
-        AdaptiveWashout,
-    ),
-    "optimal": Algorithm(
-        "the optimal washout",
-        "optimal-washout",
-        OptimalParameters,
-        OPTIMAL,
-        optimal_presets,
-        load_optimal,
-        OptimalWashout,
-    ),
-}
-"""Every family by name."""
-
-
-def family_presets() -> list[str]:
-    """Names of the shipped sets of all families."""
-    return [name for algorithm in ALGORITHMS.values() for name in algorithm.presets()]
-
-
-def load_parameters(name: str | Path) -> AnyWashout:
-    """A parameter set of any family, by preset name or from a YAML file.
-
-    A file says by ``algorithm`` which family it is of; without, it is a classical one.
-
-    Raises:
-        UnknownNameError: no preset has this name.
-        DataError: the file cannot be read.
-        ConfigurationError: a field of it is wrong.
-    """
-    if Path(name).suffix in (".yaml", ".yml"):
-        values = read_yaml(name)
-        algorithm = ALGORITHMS[check_algorithm(algorithm_of(values), name, ALGORITHMS)]
-        cls = algorithm.parameters
-        return from_dict(cls, named(cls, values, name), str(name))  # type: ignore[no-any-return]
-    for algorithm in ALGORITHMS.values():
-        if str(name) in algorithm.presets():
-            return algorithm.load(str(name))
-    raise UnknownNameError("washout preset", str(name), family_presets())
+def family_of(parameters: FamilyParameters) -> Family:
+    """Family of a parameter set."""
+    return FAMILIES[algorithm_of(parameters)]
 
 
 def check_algorithm(algorithm: str, path: str | Path, known: Iterable[str]) -> str:
     """The algorithm that a file names.
 
     Args:
-        algorithm: Found in the file.
+        algorithm: As the file has it.
         path: Of the file, for the message.
-        known: That it may be.
+        known: Algorithms to choose from.
 
     Raises:
         ConfigurationError: it is none of them.
@@ -138,95 +164,55 @@ def check_algorithm(algorithm: str, path: str | Path, known: Iterable[str]) -> s
     return algorithm
 
 
-def load_of(family: str, name: str | Path) -> AnyWashout:
+def family_presets() -> list[str]:
+    """Names of the shipped sets of all families."""
+    return [name for family in FAMILIES for name in preset_names(FAMILIES[family].presets)]
+
+
+def load_parameters(name: str | Path) -> Any:
+    """A parameter set of any family, by preset name or from a YAML file.
+
+    Raises:
+        UnknownNameError: no preset has this name.
+        DataError: the file cannot be read.
+        ConfigurationError: a field of it is wrong.
+    """
+    if Path(name).suffix in (".yaml", ".yml"):
+        values = read_yaml(name)
+        kind = FAMILIES[check_algorithm(algorithm_of(values), name, FAMILIES)].parameters
+        return from_dict(kind, named(kind, values, name), str(name))
+    for family in map(FAMILIES.__getitem__, FAMILIES):
+        if str(name) in preset_names(family.presets):
+            return load(family.parameters, family.presets / f"{name}.yaml")
+    raise UnknownNameError("washout preset", str(name), family_presets())
+
+
+def load_of(family: str, name: str | Path) -> Any:
     """A parameter set of one family, by preset name or from a YAML file.
 
     Raises:
         ConfigurationError: it is of another family; otherwise as :func:`load_parameters`.
     """
-    found = load_parameters(name)
-    if algorithm_of(found) != family:
+    parameters = load_parameters(name)
+    if algorithm_of(parameters) != family:
         raise ConfigurationError(
-            f"{name} is a set of {ALGORITHMS[algorithm_of(found)].description}; "
-            f"give one of {ALGORITHMS[family].description}"
+            f"{name} is a set of {family_of(parameters).title}; give one of {FAMILIES[family].title}"
         )
-    return found
+    return parameters
 
 
-def make_washout(parameters: AnyWashout, cab: Cab) -> Policy:
-    """The policy of a parameter set of any family, for a cab."""
-    return ALGORITHMS[algorithm_of(parameters)].make(parameters, cab)
+def _parsed(values: Any) -> Any:
+    """A parameter set, from itself or from plain values."""
+    family = FAMILIES[check_algorithm(algorithm_of(values), "parameters", FAMILIES)]
+    if isinstance(values, dict):
+        return from_dict(family.parameters, named(family.parameters, values, "parameters"), family.title)
+    if not isinstance(values, family.parameters):
+        raise ConfigurationError(f"expected the parameters of a washout, found {type(values).__name__}")
+    return values
 
 
-def kernels_of(parameters: AnyWashout) -> Family:
-    """The family of a parameter set as kernels."""
-    return ALGORITHMS[algorithm_of(parameters)].kernels
-
-
-# The classical washout's ceiling: for each standard maneuver the set that is best for it alone.
-#
-# No controller that has to take what comes: it is told which maneuver it is, and has been tuned on it.
-# It says
-# how far the structure of the classical washout reaches.
-
-
-_SETS: Final = Path(__file__).parent / "presets" / "per-maneuver"
-
-
-@configuration
-class CeilingParameters:
-    """The sets.
-
-    Args:
-        sets: By maneuver.
-    """
-
-    sets: dict[str, WashoutParameters]
-
-
-def ceiling_maneuvers() -> list[str]:
-    """Names of the maneuvers there are sets for."""
-    return sorted(path.stem for path in _SETS.glob("*.yaml"))
-
-
-def load_ceiling(maneuver: str) -> WashoutParameters:
-    """The best set for a maneuver.
-
-    Raises:
-        UnknownNameError: there is none.
-    """
-    if maneuver not in ceiling_maneuvers():
-        raise UnknownNameError("maneuver of classical-ceiling", maneuver, ceiling_maneuvers())
-    return load_washout(_SETS / f"{maneuver}.yaml")
-
-
-class CeilingWashout:
-    """The classical washout with the best set for the maneuver at hand.
-
-    Without a turntable it yaws the cab with the hexapod (k_T = 0), as the paper's EST3: the sets are tuned on
-    a machine with one.
-
-    Args:
-        platform: The machine.
-        dt: Time step, s.
-    """
-
-    name = "classical-ceiling"
-
-    def __init__(self, platform: Platform, dt: float = TIME_STEP) -> None:
-        self.platform, self.dt = platform, dt
-        sets = {name: load_ceiling(name) for name in ceiling_maneuvers()}
-        if platform.turntable is None:
-            sets = {name: replace(found, turntable_share=0.0) for name, found in sets.items()}
-        self.parameters = CeilingParameters(sets)
-
-    def for_drive(self, cues: CueTrace) -> ClassicalWashout:
-        """The washout for a maneuver, found by the name of its cues.
-
-        Raises:
-            UnknownNameError: no set has been tuned for it.
-        """
-        sets = self.parameters.sets
-        if cues.name not in sets:
-            raise UnknownNameError("maneuver of classical-ceiling", cues.name, sets)
-        return ClassicalWashout(replace(sets[cues.name], name=self.name), self.platform.cab, self.dt)
+if TYPE_CHECKING:
+    AnyWashout: TypeAlias = FamilyParameters
+else:
+    AnyWashout = Annotated[Any, PlainValidator(_parsed)]
+"""A parameter set of any family, as the field of a configuration."""

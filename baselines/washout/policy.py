@@ -1,82 +1,23 @@
-"""What the classical, the adaptive and the optimal washout have in common: kernels that act, and a start."""
+"""A washout of any family as a policy; the memory of its filters is the policy's state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Final, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ...envs.arrays import real, vec3, vec9
+from ...envs.arrays import real, vec9
 from ...envs.platform.machines import Cab
-from ...envs.settings import Vector2, Vector3
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
 from ..policy import Array, checked_episode_start, checked_observation, wrong_state
-from .kernels.blocks import HighPassParameters, Memory, Parameters, initial_memory
-from .kernels.launch import drive_kernel, predict_kernel
-from .kernels.step import washout
-from .parameters import HighPass, LowPass, TiltCoordination, WashoutParameters, load_washout
+from .families import FAMILIES, FamilyParameters, family_of, load_of, load_parameters
+from .kernels.launch import Kernels
 
-
-class FamilyParameters(Protocol):
-    """A parameter set of any family."""
-
-    @property
-    def name(self) -> str:
-        """Of the set."""
-        ...
-
-    @property
-    def description(self) -> str:
-        """One line for people."""
-        ...
-
-    @property
-    def start_carriage(self) -> Vector2:
-        """Where the carriage begins a drive, m."""
-        ...
-
-    @property
-    def start_hexapod(self) -> Vector3:
-        """Where the hexapod begins a drive, m from neutral."""
-        ...
-
-
-@dataclass(frozen=True)
-class Family:
-    """An algorithm of the washout kind, as kernels.
-
-    Args:
-        parameters: Kernel's struct of a parameter set.
-        memory: Kernel's struct of the filters' states.
-        values: (set, cab, time step in s) -> the kernel's form of a set.
-        predict: Kernel from observations, see :func:`~.kernels.predict_kernel`.
-        drive_through: Kernel fused with the machine, see :func:`~.kernels.drive_kernel`.
-    """
-
-    parameters: Any
-    memory: Any
-    values: Callable[[Any, Cab, float], Any]
-    predict: Any
-    drive_through: Any
-
-
-def make_family(
-    parameters: Any, memory: Any, begin: Any, step: Any, values: Callable[[Any, Cab, float], Any]
-) -> Family:
-    """A family of its structs, its first memory and its step; see :class:`Family`."""
-    return Family(
-        parameters,
-        memory,
-        values,
-        predict_kernel(parameters, memory, begin, step),
-        drive_kernel(parameters, begin, step),
-    )
+P = TypeVar("P", bound=FamilyParameters)
 
 
 def start_pose(p: FamilyParameters) -> Array:
@@ -86,67 +27,17 @@ def start_pose(p: FamilyParameters) -> Array:
     return pose
 
 
-# The classical washout's parameters as its kernels hold them.
-
-
-def _high_pass(block: HighPass) -> Any:
-    values: Any = HighPassParameters()
-    values.order, values.frequency, values.damping = block.order, block.frequency, block.damping
-    return values
-
-
-def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
-    """The kernels' form of a parameter set for a cab."""
-    k: Any = Parameters()
-    for name in ("force_scale", "force_limit", "rate_scale", "rate_limit"):
-        setattr(k, name, vec3(*getattr(p, name)))
-    blocks = {"hpr_roll": p.hpr[0], "hpr_pitch": p.hpr[1], "hpr_yaw": p.hpr[2], "hps_x": p.hps[0]}
-    blocks |= {"hps_y": p.hps[1], "hpi_x": p.hpi[0], "hpi_y": p.hpi[1], "hpi_z": p.hpi[2]}
-    for name, block in blocks.items():
-        setattr(k, name, _high_pass(block))
-    tilt = p.tilt or TiltCoordination()
-    k.tilt_gain = 1.0 if p.tilt else 0.0
-    k.tilt_frequency, k.tilt_damping = tilt.low_pass.frequency, tilt.low_pass.damping
-    k.tilt_rate, k.tilt_acceleration, k.tilt_approach = tilt.rate, tilt.acceleration, tilt.approach
-    lpc = p.lpc or LowPass(1.0)
-    k.carriage_share = 1.0 if p.lpc else 0.0
-    k.lpc_frequency, k.lpc_damping = lpc.frequency, lpc.damping
-    for name in (
-        "rate_bandwidth",
-        "turntable_share",
-        "turntable_gain",
-        "follow_frequency",
-        "return_frequency",
-    ):
-        setattr(k, name, getattr(p, name))
-    k.cab = vec3(*cab.reference_point)
-    return k
-
-
-def _values(p: WashoutParameters, cab: Cab, dt: float) -> Any:
-    return kernel_parameters(p, cab)
-
-
-CLASSICAL: Final[Family] = make_family(Parameters, Memory, initial_memory, washout, _values)
-"""The paper's algorithm."""
-
-# A washout as a policy; the classical one.
-
-
-P = TypeVar("P", bound=FamilyParameters)
-
-
 class _Buffers:
     """Arrays of one batch size and the launch recorded on them."""
 
-    def __init__(self, family: Family, n: int, parameters: Any, parameters_of: Any, dt: float) -> None:
+    def __init__(self, kernels: Kernels, n: int, parameters: Any, parameters_of: Any, dt: float) -> None:
         self.observation = wp.zeros((n, OBSERVATION_SIZE), dtype=real, device="cpu")
         self.begins = wp.zeros(n, dtype=wp.bool, device="cpu")
-        self.memory = wp.zeros(n, dtype=family.memory, device="cpu")
-        self.after = wp.zeros(n, dtype=family.memory, device="cpu")
+        self.memory = wp.zeros(n, dtype=kernels.memory, device="cpu")
+        self.after = wp.zeros(n, dtype=kernels.memory, device="cpu")
         self.action = wp.zeros(n, dtype=vec9, device="cpu")
         self.launch = wp.launch(
-            family.predict,
+            kernels.predict,
             n,
             inputs=[parameters, parameters_of, self.observation, self.begins, self.memory, real(dt)],
             outputs=[self.after, self.action],
@@ -169,9 +60,7 @@ def _as_bytes(memory: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 class WashoutPolicy(Generic[P]):
-    """An algorithm of the washout kind as a policy; its memory is the policy's state.
-
-    A subclass says which algorithm it is.
+    """A washout as a policy.
 
     Args:
         parameters: A parameter set, a preset name or a YAML file; default: the set by hand.
@@ -179,28 +68,26 @@ class WashoutPolicy(Generic[P]):
         dt: Time step, s.
 
     Attributes:
-        family: The algorithm as kernels.
-        kind: Class of its parameter sets.
-        load: A parameter set by preset name or from a YAML file.
-        by_hand: Preset name of the set by hand.
+        algorithm: Family of a subclass; the class itself takes sets of any family.
     """
 
-    family: ClassVar[Family]
-    kind: ClassVar[type[Any]]
-    load: ClassVar[staticmethod[[str | Path], Any]]
-    by_hand: ClassVar[str]
+    algorithm: ClassVar[str | None] = None
 
     def __init__(
         self, parameters: P | str | Path | None = None, cab: Cab | None = None, dt: float = TIME_STEP
     ) -> None:
-        given: Any = self.by_hand if parameters is None else parameters
-        self.parameters: P = given if isinstance(given, self.kind) else self.load(given)
+        given: Any = FAMILIES[self.algorithm or "classical"].start if parameters is None else parameters
+        if isinstance(given, str | Path):
+            given = load_of(self.algorithm, given) if self.algorithm else load_parameters(given)
+        self.parameters: P = given
+        self.family = FAMILIES[self.algorithm] if self.algorithm else family_of(given)
         self.name = self.parameters.name
         self.cab = cab or Cab()
         self.dt = dt
         self._start = start_pose(self.parameters)
+        kernels = self.family.kernels
         self._kernel_parameters = wp.array(
-            [self.family.values(self.parameters, self.cab, dt)], dtype=self.family.parameters, device="cpu"
+            [kernels.values(self.parameters, self.cab, dt)], dtype=kernels.parameters, device="cpu"
         )
         self._buffers: dict[int, _Buffers] = {}
         # Compiled and loaded now, so that the first step of a drive takes no longer than the others.
@@ -248,14 +135,10 @@ class WashoutPolicy(Generic[P]):
         return self._buffers_with(n, self._kernel_parameters, parameters_of)
 
     def _buffers_with(self, n: int, parameters: Any, parameters_of: Any) -> _Buffers:
-        self._buffers[n] = _Buffers(self.family, n, parameters, parameters_of, self.dt)
+        self._buffers[n] = _Buffers(self.family.kernels, n, parameters, parameters_of, self.dt)
         return self._buffers[n]
 
 
-class ClassicalWashout(WashoutPolicy[WashoutParameters]):
-    """The paper's algorithm as a policy; arguments as of :class:`WashoutPolicy`."""
-
-    family = CLASSICAL
-    kind = WashoutParameters
-    load = staticmethod(load_washout)
-    by_hand = "classical"
+def make_washout(parameters: FamilyParameters, cab: Cab) -> WashoutPolicy[Any]:
+    """The policy of a parameter set of any family, for a cab."""
+    return WashoutPolicy(parameters, cab)

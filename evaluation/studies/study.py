@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ...baselines.washout.families import make_washout
+from ...baselines.washout import make_washout
 from ...envs.car import Car
 from ...envs.cues import CueTrace
 from ...envs.errors import MotionCueingError

@@ -82,10 +82,10 @@ def test_an_agent_meets_a_machine_it_does_not_know():
 
 
 def test_a_policy_that_is_told_the_drive_is_left_out_where_it_must_be_causal():
-    make = robust(["classical-ceiling"]).conditions()[0].make
+    make = robust(["classical-per-maneuver"]).conditions()[0].make
     with pytest.raises(ConfigurationError, match="told the drive"):
-        make("classical-ceiling")
-    assert robust().conditions()[0].make("classical-ceiling") is not None
+        make("classical-per-maneuver")
+    assert robust().conditions()[0].make("classical-per-maneuver") is not None
 
 
 def test_drives_under_noise_of_another_definition_are_not_of_the_same(monkeypatch):

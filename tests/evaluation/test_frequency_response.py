@@ -9,8 +9,7 @@ import pytest
 from scipy import signal
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
-from motion_cueing.baselines.washout.parameters import (
-    OPEN,
+from motion_cueing.baselines.washout.classical.family import (
     HighPass,
     LowPass,
     TiltCoordination,
@@ -23,6 +22,7 @@ from motion_cueing.evaluation.metrics import CUE_AXES
 from motion_cueing.evaluation.policies import make_policy
 
 DT = 0.01
+OPEN = HighPass()
 PAPER = get_platform("paper")
 SHORT = FrequencyTest(frequencies=(0.8, 3.0, 12.0), settling=25.0, settling_periods=1.0, window=5.0)
 """Long enough for the filters of these tests."""

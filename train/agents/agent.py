@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...baselines import ClassicalWashout
 from ...baselines.washout import ScheduledWashout, WashoutParameters, load_washout
-from ...baselines.washout.scheduled import KNOBS
+from ...baselines.washout.classical.scheduled import KNOBS
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
 from ...envs.platform.kernels.step import AXES
 from ...envs.platform.machines import Platform

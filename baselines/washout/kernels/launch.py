@@ -1,9 +1,10 @@
-"""Washouts as kernels: accelerations from observations, fused with the machine; one with its adjoint.
+"""Kernels of a washout, made for its structs and step: on observations, fused with the machine, with adjoint.
 
-The kernels are made for the structs and the step of a washout. Warp reads their annotations, so this module
-must not keep them as text.
+Warp reads their annotations, so this module must not have ``from __future__ import annotations``.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
@@ -11,9 +12,9 @@ import warp as wp
 from ....envs.arrays import real, vec9
 from ....envs.perception.kernels import Vestibular
 from ....envs.platform.kernels.step import Machine, SetPoint
+from ....envs.platform.machines import Cab
 from ....envs.simulator.kernels.step import Drives, State, Zone, cue_error, next_state, perceived_error
-from .blocks import Memory, Parameters, initial_memory, read_observation, read_state
-from .step import washout
+from .blocks import read_observation, read_state
 
 
 @wp.struct
@@ -113,24 +114,71 @@ def drive_kernel(Parameters: Any, begin: Any, step: Any) -> Any:
     return drive_through
 
 
-@wp.kernel(enable_backward=True, module="unique")
-def act(
-    parameters: wp.array(dtype=Parameters),
-    parameters_of: wp.array(dtype=int),
-    state: wp.array(dtype=State),
-    memory: wp.array(dtype=Memory),
-    begins: int,
-    dt: real,
-    memory_out: wp.array(dtype=Memory),
-    action: wp.array(dtype=vec9),
-) -> None:
-    """The washout on the simulator's own state, with its adjoint; memories begin anew where ``begins``."""
-    i = wp.tid()
-    p = parameters[parameters_of[i]]
-    seen = read_state(state[i])
-    m = memory[i]
-    if begins != 0:
-        m = initial_memory(p, seen)
-    out = washout(p, m, seen, dt)
-    memory_out[i] = out.memory
-    action[i] = out.action
+def act_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
+    """A kernel with adjoint: the algorithm on the simulator's own state; ``begins`` starts memories anew.
+
+    Arguments as in :func:`predict_kernel`.
+    """
+
+    @wp.kernel(enable_backward=True, module="unique")
+    def act(
+        parameters: wp.array(dtype=Parameters),
+        parameters_of: wp.array(dtype=int),
+        state: wp.array(dtype=State),
+        memory: wp.array(dtype=Memory),
+        begins: int,
+        dt: real,
+        memory_out: wp.array(dtype=Memory),
+        action: wp.array(dtype=vec9),
+    ) -> None:
+        i = wp.tid()
+        p = parameters[parameters_of[i]]
+        seen = read_state(state[i])
+        m = memory[i]
+        if begins != 0:
+            m = begin(p, seen)
+        out = step(p, m, seen, dt)
+        memory_out[i] = out.memory
+        action[i] = out.action
+
+    return act
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """A washout algorithm as kernels.
+
+    Args:
+        parameters: Struct of a parameter set.
+        memory: Struct of the filters' states.
+        values: (set, cab, time step in s) -> the struct of a set.
+        predict: Kernel from observations, see :func:`predict_kernel`.
+        drive_through: Kernel fused with the machine, see :func:`drive_kernel`.
+        act: Kernel with adjoint, see :func:`act_kernel`; None for an algorithm without a gradient.
+    """
+
+    parameters: Any
+    memory: Any
+    values: Callable[[Any, Cab, float], Any]
+    predict: Any
+    drive_through: Any
+    act: Any
+
+
+def make_kernels(
+    parameters: Any,
+    memory: Any,
+    begin: Any,
+    step: Any,
+    values: Callable[[Any, Cab, float], Any],
+    differentiable: bool = False,
+) -> Kernels:
+    """The kernels of an algorithm from its structs, its first memory and its step."""
+    return Kernels(
+        parameters,
+        memory,
+        values,
+        predict_kernel(parameters, memory, begin, step),
+        drive_kernel(parameters, begin, step),
+        act_kernel(parameters, memory, begin, step) if differentiable else None,
+    )

@@ -1,14 +1,6 @@
 """Optimal washout: linear filters that minimize the perceived error, by the Riccati equation."""
 
-from .design import HeaveWeights, OptimalParameters, PlaneWeights, YawWeights, load_optimal, optimal_presets
-from .policy import OptimalWashout
+from .design import HeaveWeights, OptimalParameters, PlaneWeights, YawWeights
+from .family import OptimalWashout
 
-__all__ = [
-    "HeaveWeights",
-    "OptimalParameters",
-    "OptimalWashout",
-    "PlaneWeights",
-    "YawWeights",
-    "load_optimal",
-    "optimal_presets",
-]
+__all__ = ["HeaveWeights", "OptimalParameters", "OptimalWashout", "PlaneWeights", "YawWeights"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -16,9 +15,7 @@ from ....envs.cues import GRAVITY
 from ....envs.errors import ConfigurationError
 from ....envs.perception import Canals, Otoliths, get_vestibular_model
 from ....envs.settings import Positive, Vector2, Vector3, configuration
-from ...presets import load_preset, preset_names
-from .. import LowPass
-from ..parameters import Limits, Share
+from ..classical.family import Limits, LowPass, Share
 
 
 @configuration
@@ -133,25 +130,6 @@ class OptimalParameters:
 
     def __post_init__(self) -> None:
         get_vestibular_model(self.vestibular)
-
-
-_PRESETS: Final = Path(__file__).parent / "presets"
-
-
-def optimal_presets() -> list[str]:
-    """Names of the shipped parameter sets."""
-    return preset_names(_PRESETS)
-
-
-def load_optimal(name: str | Path) -> OptimalParameters:
-    """A parameter set by preset name, or from a YAML file.
-
-    Raises:
-        UnknownNameError: no preset has this name.
-        DataError: the file cannot be read.
-        ConfigurationError: a field of it is wrong.
-    """
-    return load_preset(OptimalParameters, "optimal washout preset", name, _PRESETS)
 
 
 # The linear-quadratic problem behind a filter, and its solution by the algebraic Riccati equation.

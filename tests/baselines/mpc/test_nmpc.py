@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import symbolic as compiled_module
-from motion_cueing.baselines.mpc import Margins, NmpcParameters, make_nmpc
+from motion_cueing.baselines.mpc import Margins
 from motion_cueing.baselines.mpc import solver as planner_module
-from motion_cueing.baselines.mpc.prediction import N_CUES, Linearized
-from motion_cueing.baselines.mpc.solver import Planned, Planner
+from motion_cueing.baselines.mpc.prediction import N_CUES, MachineModel
+from motion_cueing.baselines.mpc.solver import Plan, Planner
 from motion_cueing.baselines.symbolic import compiled
 from motion_cueing.envs.maneuvers import get_maneuver
-from motion_cueing.evaluation import measure, rollout
+from motion_cueing.evaluation import measure
 
 from .machines import NODES, PAPER, quick
 from .test_policy import SLALOM, driven
@@ -21,9 +21,9 @@ from .test_policy import SLALOM, driven
 NONE = np.zeros(0, dtype=np.intp)
 
 
-def plan(iterations: int, tolerance: float = 1e-6) -> tuple[Planned, np.ndarray]:
+def plan(iterations: int, tolerance: float = 1e-6) -> tuple[Plan, np.ndarray]:
     """A plan for a machine under way in a slalom, and the car's cues at its nodes."""
-    planner = Planner(PAPER, quick(), iterations, tolerance)
+    planner = Planner(PAPER, quick(nonlinear=True, iterations=iterations, tolerance=tolerance))
     position = np.array([4.0, -9.0, 0.1, -0.2, 0.05, 0.1, -0.05, 0.05, 1.0])
     rate = np.array([1.0, -3.0, 0.1, 0.2, 0.0, 0.1, 0.1, 0.0, 0.3])
     cues = get_maneuver("slalom").drive()
@@ -36,8 +36,8 @@ def test_a_converged_plan_keeps_the_exact_limits():
     planned, _ = plan(50, tolerance=5e-3)
     assert planned.solved
     assert planned.converged
-    linearized = Linearized(PAPER, len(NODES), Margins(), compile=False)
-    exact = linearized(planned.plan.position, planned.plan.rate, planned.plan.acceleration)
+    linearized = MachineModel(PAPER, len(NODES), Margins(), compile=False)
+    exact = linearized(planned.motion.position, planned.motion.rate, planned.motion.acceleration)
     limits = exact.values[:, N_CUES:]
     assert np.all(limits <= linearized.upper + 1e-4)
     assert np.all(limits >= linearized.lower - 1e-4)
@@ -47,36 +47,35 @@ def test_a_converged_plan_keeps_the_exact_limits():
 def test_the_search_ends_where_a_new_program_changes_nothing():
     first, _ = plan(50)
     again, wanted = plan(1)
-    assert not np.allclose(first.plan.acceleration, again.plan.acceleration, atol=1e-3)
-    planner = Planner(PAPER, quick(), 1)
-    motion = first.plan
+    assert not np.allclose(first.motion.acceleration, again.motion.acceleration, atol=1e-3)
+    planner = Planner(PAPER, quick())
+    motion = first.motion
     # From the same state and about the converged plan, one more program stays there.
     position = np.array([4.0, -9.0, 0.1, -0.2, 0.05, 0.1, -0.05, 0.05, 1.0])
     rate = np.array([1.0, -3.0, 0.1, 0.2, 0.0, 0.1, 0.1, 0.0, 0.3])
     more = planner(position, rate, wanted, motion.acceleration, first.active)
-    assert np.abs(more.plan.acceleration - motion.acceleration).max() < 1e-3
+    assert np.abs(more.motion.acceleration - motion.acceleration).max() < 1e-3
 
 
 def test_a_plan_no_share_of_whose_change_helps_is_not_at_its_end(monkeypatch):
     assert plan(50, tolerance=0.05)[0].converged
-    monkeypatch.setattr(planner_module._Search, "share", lambda *arguments: 0.0)
+    # No public part has this fate: a search along the step that never succeeds.
+    monkeypatch.setattr(planner_module, "_backtrack", lambda *arguments: 0.0)
     stuck, _ = plan(50, tolerance=0.05)
     assert stuck.solved
     assert not stuck.converged
     assert stuck.iterations == 1  # the same program again would say the same
-    assert not np.any(stuck.plan.acceleration)
+    assert not np.any(stuck.motion.acceleration)
 
 
 def test_one_iteration_is_the_linear_controller():
-    parameters = quick(preview=1.0, every=4)
     linear = driven(SLALOM, preview=1.0, every=4)
-    nonlinear = rollout(make_nmpc(PAPER, NmpcParameters(mpc=parameters, iterations=1)), SLALOM, PAPER)
+    nonlinear = driven(SLALOM, preview=1.0, every=4, nonlinear=True, iterations=1)
     assert np.array_equal(linear.action, nonlinear.action)
 
 
 def test_it_drives_within_limits_and_as_well_as_the_linear_one():
-    parameters = NmpcParameters(mpc=quick(preview=1.0, every=4))
-    trajectory = rollout(make_nmpc(PAPER, parameters), SLALOM, PAPER)
+    trajectory = driven(SLALOM, preview=1.0, every=4, nonlinear=True)
     linear = measure(driven(SLALOM, preview=1.0, every=4)).cue_error
     assert measure(trajectory).cue_error < 1.1 * linear + 0.01
     assert not np.any(trajectory.limits_active)
@@ -141,6 +140,6 @@ def test_without_a_compiler_the_function_stays_as_it_is(cache, monkeypatch, comm
 
 def test_compiled_derivatives_are_those_of_the_symbols(cache):
     x = 0.1 * np.random.default_rng(1).normal(size=(3, 2, 9))
-    found = [Linearized(PAPER, 2, Margins(), compile=compile)(*x) for compile in (False, True)]
+    found = [MachineModel(PAPER, 2, Margins(), compile=compile)(*x) for compile in (False, True)]
     assert np.allclose(found[0].slopes, found[1].slopes, rtol=0.0, atol=1e-12)
     assert np.allclose(found[0].values, found[1].values, rtol=0.0, atol=1e-12)

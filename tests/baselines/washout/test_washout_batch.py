@@ -13,16 +13,16 @@ from motion_cueing.baselines.washout import (
     HighPass,
     LowPass,
     TiltCoordination,
+    WashoutParameters,
     load_washout,
 )
 from motion_cueing.baselines.washout.batch import WashoutBatch
-from motion_cueing.baselines.washout.parameters import WashoutParameters
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.evaluation import measure, rollout
 
-from .drives import trace
+from ..drives import trace
 
 PAPER = get_platform("paper")
 DRIVES = [

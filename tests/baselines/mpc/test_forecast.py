@@ -46,34 +46,34 @@ def test_after_the_end_the_last_cues_stay():
 
 def test_a_guess_goes_to_rest_in_two_parts():
     forecast = Forecast(memory=1.0, force_decay=(0.5, 1.0, 2.0), rate_decay=0.2, lasting_decay=5.0)
-    now, lasts = REST + 2.0, REST + 0.5
-    ahead = Forecaster(GRID, forecast)(now, lasts, 0)
+    now, sustained = REST + 2.0, REST + 0.5
+    ahead = Forecaster(GRID, forecast)(now, sustained, 0)
     times = 0.01 * np.arange(1, 101)[:, None]
     constants = np.array([0.5, 1.0, 2.0, 0.2, 0.2, 0.2])
     series = REST + 0.5 * np.exp(-times / 5.0) + 1.5 * np.exp(-times / constants)
     assert np.abs(ahead - GRID.averages(0.01) @ series).max() < 1e-12
 
 
-def test_what_lasts_is_a_low_pass_that_begins_at_the_first_cues():
+def test_the_sustained_cue_is_a_low_pass_that_begins_at_the_first_cue():
     cues, forecast = drive(), Forecast(preview=0.3, memory=0.7)
     told, alone = Forecaster(GRID, forecast, cues), Forecaster(GRID, Forecast(memory=0.7))
-    lasts = None
+    sustained = None
     values = values_of(cues)
     for now in values[:131]:
-        lasts = alone.remember(lasts, now)
+        sustained = alone.update(sustained, now)
     known = GRID.averages(0.01)[:, :30] @ values[101:131]
     guessed = told(REST, REST, 100) - known
-    assert lasts is not None
-    assert guessed[-1] == pytest.approx(_at_last_node(forecast, values[130], lasts), abs=1e-9)
+    assert sustained is not None
+    assert guessed[-1] == pytest.approx(_at_last_node(forecast, values[130], sustained), abs=1e-9)
 
 
-def _at_last_node(forecast: Forecast, now: np.ndarray, lasts: np.ndarray) -> np.ndarray:
+def _at_last_node(forecast: Forecast, now: np.ndarray, sustained: np.ndarray) -> np.ndarray:
     weights = GRID.averages(0.01)[-1, 30:]
     after = 0.01 * np.arange(1, 71)[:, None]
     constants = np.array([*forecast.force_decay, *[forecast.rate_decay] * 3])
     series = (
         REST
-        + (lasts - REST) * np.exp(-after / forecast.lasting_decay)
-        + (now - lasts) * np.exp(-after / constants)
+        + (sustained - REST) * np.exp(-after / forecast.lasting_decay)
+        + (now - sustained) * np.exp(-after / constants)
     )
     return np.asarray(weights @ series)

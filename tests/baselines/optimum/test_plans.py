@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from motion_cueing.baselines import ClassicalWashout, make_policy
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
-from motion_cueing.baselines.optimum.windows import Planner, Problem, windows
+from motion_cueing.baselines.optimum.windows import Planner, WindowProgram, windows
 from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError
@@ -41,7 +41,7 @@ def test_a_surge_within_the_travel_is_felt_as_it_is():
 
 def test_the_plan_gives_what_it_claims_and_meets_no_limit(braking):
     _, plan, record = braking
-    found, account = measure(record), plan.account
+    found, account = measure(record), plan.report
     assert account.braked == account.unconverged == 0
     assert found.cue_error == pytest.approx(account.claimed, rel=1e-9)
     assert found.cue_error == pytest.approx(account.played, rel=1e-9)
@@ -105,11 +105,11 @@ def test_no_short_detour_within_the_limits_is_better(braking):
 
 def test_a_finer_grid_and_longer_legs_are_better(braking):
     drive, plan, _ = braking
-    coarser = Optimum(options=replace(COARSE, steps=10)).plan(drive).account
-    assert plan.account.played < coarser.played
+    coarser = Optimum(options=replace(COARSE, steps=10)).plan(drive).report
+    assert plan.report.played < coarser.played
     paper = get_platform("paper")
     longer = replace(paper, hexapod=replace(paper.hexapod, extension=(-0.8, 0.8)))
-    assert Optimum(longer, COARSE).plan(drive).account.played < 0.99 * plan.account.played
+    assert Optimum(longer, COARSE).plan(drive).report.played < 0.99 * plan.report.played
 
 
 def test_it_is_better_than_the_washout():
@@ -132,8 +132,8 @@ def test_the_perceived_optimum_gives_what_it_claims_and_is_perceived_better():
 
 def test_windows_agree_with_the_whole():
     drive = gentle(4.0)
-    whole = Optimum(options=COARSE).plan(drive).account
-    parts = Optimum(options=replace(COARSE, window=2.5, keep=1.0)).plan(drive).account
+    whole = Optimum(options=COARSE).plan(drive).report
+    parts = Optimum(options=replace(COARSE, window=2.5, keep=1.0)).plan(drive).report
     assert (whole.windows, parts.windows) == (1, 3)
     assert parts.claimed == pytest.approx(parts.played, rel=1e-6)
     assert parts.played == pytest.approx(whole.played, abs=0.002)
@@ -142,7 +142,7 @@ def test_windows_agree_with_the_whole():
 def test_windows_of_what_is_perceived_know_what_was_felt_before():
     """A filter that forgot its past at a window's start would claim something else than what is played."""
     options = OptimumOptions(objective="perceived", window=1.0, keep=0.7)
-    account = Optimum(options=options).plan(hard_braking(1.5, 9.0)).account
+    account = Optimum(options=options).plan(hard_braking(1.5, 9.0)).report
     assert account.windows == 2
     assert account.played > 0.01
     assert account.claimed == pytest.approx(account.played, rel=0.01)
@@ -186,21 +186,21 @@ def test_a_machine_that_begins_elsewhere_gets_its_own_plan():
 
 
 def test_a_solve_cut_short_is_counted_and_keeps_the_limits():
-    options = replace(COARSE, iterations=2)
+    options = replace(COARSE, iterations=2, widenings=0)
     record = rollout(Optimum(options=options), hard_braking(2.0))
     assert record.metadata["optimum_unconverged"] == "1"
     assert not record.limits_active.any()
 
 
 def test_without_a_plan_that_keeps_the_limits_the_machine_brakes_to_a_stop(monkeypatch):
-    solve, asked = Problem.solve, []
+    solve, asked = WindowProgram.solve, []
 
     def spoilt(self, wanted, start):
         solution = solve(self, wanted, start)
         asked.append(self.margin)
         return solution if len(asked) == 1 else replace(solution, accelerations=50.0 + solution.accelerations)
 
-    monkeypatch.setattr(Problem, "solve", spoilt)
+    monkeypatch.setattr(WindowProgram, "solve", spoilt)
     options = replace(COARSE, window=2.0, keep=1.0, widenings=1)
     record = rollout(Optimum(options=options, cached=False), surge(3.0, 3.0))
     notes = record.metadata
@@ -213,15 +213,15 @@ def test_without_a_plan_that_keeps_the_limits_the_machine_brakes_to_a_stop(monke
 
 
 def test_a_plan_that_is_not_finite_is_no_plan(monkeypatch):
-    solve = Problem.solve
+    solve = WindowProgram.solve
 
     def spoilt(self, wanted, start):
         solution = solve(self, wanted, start)
         return replace(solution, accelerations=np.nan * solution.accelerations, converged=False)
 
-    monkeypatch.setattr(Problem, "solve", spoilt)
+    monkeypatch.setattr(WindowProgram, "solve", spoilt)
     plan = Optimum(options=replace(COARSE, widenings=0), cached=False).plan(surge(1.0, 1.0))
-    assert plan.account.braked == plan.account.unconverged == 1
+    assert plan.report.braked == plan.report.unconverged == 1
     assert not plan.accelerations.any()
 
 

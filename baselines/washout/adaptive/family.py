@@ -1,4 +1,7 @@
-"""Parameters of the adaptive washout: those of the classical one, and of what adapts its gains."""
+"""The adaptive washout: parameters, ranges of a search, and the family itself.
+
+It is the classical washout with gains that a steepest descent adapts during the drive, see :mod:`.kernels`.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,17 @@ from ....envs.arrays import vec3
 from ....envs.errors import ConfigurationError
 from ....envs.platform.machines import Cab
 from ....envs.settings import NonNegative, Positive, Vector2, configuration
-from ...presets import load_preset, preset_names
-from .. import WashoutParameters
-from ..policy import Family, WashoutPolicy, kernel_parameters, make_family
+from ..classical.family import (
+    CARRIAGE_SPEED,
+    COORDINATES,
+    HEAVE_TRAVEL,
+    TRAVEL,
+    WashoutParameters,
+    kernel_parameters,
+)
+from ..families import Coordinate, Family, coordinates
+from ..kernels.launch import make_kernels
+from ..policy import WashoutPolicy
 from .kernels import AdaptiveKernelParameters, AdaptiveMemory, adaptive_washout, initial_adaptive_memory
 
 Speeds = tuple[NonNegative, NonNegative, NonNegative]
@@ -21,13 +32,13 @@ Scales = tuple[Positive, Positive, Positive]
 
 @configuration
 class Adaptation:
-    """The cost whose steepest descent moves the gains, and how fast it does.
+    """Cost and speed of the steepest descent that adapts the gains.
 
     Each term of the cost is the square of a quantity over the size at which it counts 1. A gain p moves with
-    dp/dt = -speed dC/dp, C being half the sum of the terms that it has a part in.
+    dp/dt = -speed dC/dp. C is half the sum of the terms that the gain has a part in.
 
     Args:
-        force: Error of what the translations must add, m/s^2; the default is J's indifference zone.
+        force: Error of the translational acceleration, m/s^2; the default is J's indifference zone.
         rate: Error of the Euler rates, rad/s; the default is J's indifference zone.
         displacement: Displacement of the cab by the translations, horizontal and vertical, m.
         velocity: Its velocity, horizontal and vertical, m/s.
@@ -69,28 +80,6 @@ class AdaptiveParameters(WashoutParameters):
     adaptation: Adaptation = Adaptation()
 
 
-_PRESETS: Final = Path(__file__).parent / "presets"
-
-
-def adaptive_presets() -> list[str]:
-    """Names of the shipped parameter sets."""
-    return preset_names(_PRESETS)
-
-
-def load_adaptive(name: str | Path) -> AdaptiveParameters:
-    """A parameter set by preset name, or from a YAML file.
-
-    Raises:
-        UnknownNameError: no preset has this name.
-        DataError: the file cannot be read.
-        ConfigurationError: a field of it is wrong.
-    """
-    return load_preset(AdaptiveParameters, "adaptive washout preset", name, _PRESETS)
-
-
-# The adaptive washout as a policy.
-
-
 def _values(p: AdaptiveParameters, cab: Cab, dt: float) -> Any:
     """The kernels' form of a parameter set."""
     k: Any = AdaptiveKernelParameters()
@@ -107,16 +96,39 @@ def _values(p: AdaptiveParameters, cab: Cab, dt: float) -> Any:
     return k
 
 
-ADAPTIVE: Final[Family] = make_family(
-    AdaptiveKernelParameters, AdaptiveMemory, initial_adaptive_memory, adaptive_washout, _values
+_SPEED: Final = (0.001, 10.0)
+"""1/s; from a gain that hardly moves in a drive to one that follows every cue."""
+_DEPARTURE: Final = (0.03, 3.0)
+_ANGLE: Final = (0.02, 100.0)
+"""rad; the turntable has no end."""
+
+_COORDINATES: Final = (
+    *COORDINATES,
+    *coordinates("adaptation.force_speed.{}", 3, _SPEED),
+    *coordinates("adaptation.rate_speed.{}", 3, _SPEED),
+    Coordinate("adaptation.force_departure", *_DEPARTURE),
+    Coordinate("adaptation.rate_departure", *_DEPARTURE),
+    Coordinate("adaptation.displacement.0", *TRAVEL),
+    Coordinate("adaptation.displacement.1", *HEAVE_TRAVEL),
+    Coordinate("adaptation.velocity.0", *CARRIAGE_SPEED),
+    Coordinate("adaptation.velocity.1", *HEAVE_TRAVEL),
+    *coordinates("adaptation.angle.{}", 3, _ANGLE),
 )
-"""The classical algorithm with adapted gains."""
+
+FAMILY: Final = Family(
+    name="adaptive",
+    title="the adaptive washout",
+    parameters=AdaptiveParameters,
+    kernels=make_kernels(
+        AdaptiveKernelParameters, AdaptiveMemory, initial_adaptive_memory, adaptive_washout, _values
+    ),
+    presets=Path(__file__).parent / "presets",
+    start="adaptive",
+    coordinates=_COORDINATES,
+)
 
 
 class AdaptiveWashout(WashoutPolicy[AdaptiveParameters]):
-    """The adaptive washout as a policy, gains and all; arguments as of :class:`WashoutPolicy`."""
+    """The adaptive washout as a policy; arguments as of :class:`~..policy.WashoutPolicy`."""
 
-    family = ADAPTIVE
-    kind = AdaptiveParameters
-    load = staticmethod(load_adaptive)
-    by_hand = "adaptive"
+    algorithm = "adaptive"

@@ -10,8 +10,8 @@ from scipy.optimize import nnls
 
 from motion_cueing.baselines.mpc import solver as solver_module
 from motion_cueing.baselines.mpc.prediction import N_CUES, Linearization, cue_scales, make_grid
-from motion_cueing.baselines.mpc.problem import Bounds, Plan, Problem
-from motion_cueing.baselines.mpc.solver import Solution, solve
+from motion_cueing.baselines.mpc.problem import Bounds, HorizonProgram, Motion
+from motion_cueing.baselines.mpc.solver import QpSolution, solve
 
 from .machines import PAPER, quick
 
@@ -26,11 +26,11 @@ class Case:
     def __init__(self, seed: int, width: float, price: float = 1e6) -> None:
         rng = np.random.default_rng(seed)
         self.grid = make_grid(NODES)
-        self.problem = Problem(PAPER, quick(nodes=NODES), self.grid)
+        self.program = HorizonProgram(PAPER, quick(nodes=NODES), self.grid)
         self.about = Linearization(rng.normal(size=(N, K)), rng.normal(size=(N, K, 27)))
-        self.plan = Plan(*(rng.normal(size=(N, 9)) for _ in range(3)))
+        self.motion = Motion(*(rng.normal(size=(N, 9)) for _ in range(3)))
         self.reference_cue = rng.normal(size=(N, 6))
-        self.cost = self.problem.cost(self.plan, self.about, self.reference_cue, None)
+        self.cost = self.program.cost(self.motion, self.about, self.reference_cue, None)
         self.bounds = bounds_of(width, price)
         # All rows as they depend on the unknowns, node by node, by hand.
         at = np.zeros((N, K, N, 9))
@@ -41,10 +41,10 @@ class Case:
                 at[j, :, i] += parts[:, 2] * (i == j)
         self.rows = at.reshape(N * K, N * 9)
 
-    def solve(self, guess: np.ndarray = NONE) -> Solution:
-        return solve(self.problem, self.cost, self.about, self.bounds, guess, 30)
+    def solve(self, guess: np.ndarray = NONE) -> QpSolution:
+        return solve(self.program, self.cost, self.about, self.bounds, guess, 30)
 
-    def unknowns(self, solution: Solution) -> np.ndarray:
+    def unknowns(self, solution: QpSolution) -> np.ndarray:
         return solution.change.acceleration.ravel()
 
 
@@ -64,11 +64,11 @@ def test_without_limits_it_is_least_squares():
     cues = case.rows.reshape(N, K, -1)[:, :N_CUES].reshape(N * N_CUES, -1)
     error = (case.about.values[:, :N_CUES] - case.reference_cue / cue_scales()).ravel()
     blocks, targets = [weights[:, None] * cues], [-weights * error]
-    for axis, terms in enumerate(case.problem.motion_weights):
+    for axis, terms in enumerate(case.program.motion_weights):
         pick = np.eye(9)[axis]
         for maps, values, weight in zip(
             (case.grid.position, case.grid.rate, np.eye(N)),
-            (case.plan.position, case.plan.rate, case.plan.acceleration),
+            (case.motion.position, case.motion.rate, case.motion.acceleration),
             terms,
             strict=True,
         ):
@@ -152,7 +152,7 @@ def test_rounds_are_the_duals_that_were_solved_and_bounded(monkeypatch, rounds):
     daqp = solver_module.daqp
     monkeypatch.setattr(solver_module, "daqp", Counting)
     case = Case(7, 0.01)
-    solution = solve(case.problem, case.cost, case.about, case.bounds, NONE, rounds)
+    solution = solve(case.program, case.cost, case.about, case.bounds, NONE, rounds)
     assert solution.rounds == Counting.calls <= rounds
     assert solution.solved == (rounds == 30)
     assert solution.solved or Counting.calls == rounds

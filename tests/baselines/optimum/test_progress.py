@@ -38,12 +38,12 @@ def test_a_long_solve_shows_how_far_it_is(monkeypatch):
 def test_a_short_one_shows_nothing(monkeypatch):
     terminal = on_terminal(monkeypatch)
     with SolveProgress("drive") as shown:
-        shown.tell(0.0, 1)
+        shown.on_window(0.0, 1)
     assert terminal.getvalue() == ""
 
 
 def test_where_it_is_not_wanted_nobody_is_told(monkeypatch):
     on_terminal(monkeypatch)
-    assert SolveProgress("drive", wanted=False).tell is None
+    assert SolveProgress("drive", enabled=False).on_window is None
     monkeypatch.setattr(sys, "stderr", io.StringIO())
-    assert SolveProgress("drive").tell is None
+    assert SolveProgress("drive").on_window is None

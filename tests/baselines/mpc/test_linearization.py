@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines.mpc import Margins
-from motion_cueing.baselines.mpc.prediction import N_CUES, Linearized, cue_scales
+from motion_cueing.baselines.mpc.prediction import N_CUES, MachineModel, cue_scales
 from motion_cueing.baselines.mpc.problem import moving_axes
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import get_platform
@@ -52,7 +52,7 @@ def test_slopes_are_differences_of_the_kernel():
     base[10:] -= PUSH * np.eye(9)
     simulator = moved(actions[:-1], base)
     q, v, a = row_of(simulator, 0)
-    linear = Linearized(PAPER, 1, Margins(), compile=False)(q[None], v[None], a[None])
+    linear = MachineModel(PAPER, 1, Margins(), compile=False)(q[None], v[None], a[None])
     cues = felt(simulator) / cue_scales()
     assert np.abs(linear.values[0, :N_CUES] - cues[0]).max() < 1e-9
     measured = (cues[1:10] - cues[10:]) / (2.0 * PUSH)  # (9, 6)
@@ -66,7 +66,7 @@ def test_limit_rows_are_shares_of_the_actuators_limits():
     simulator = moved(rng.normal(size=(30, 9)), rng.normal(size=(1, 9)))
     q, v, a = row_of(simulator, 0)
     margins = Margins(position=1.0, rate=1.0, acceleration=1.0, braking=1.0)
-    linearized = Linearized(PAPER, 1, margins, compile=False)
+    linearized = MachineModel(PAPER, 1, margins, compile=False)
     rows = linearized(q[None], v[None], a[None]).values[0, N_CUES:]
     motion, limits = simulator.state[0]["motion"], simulator.machines.numpy()[0]
     place, rate = motion["position"], motion["rate"]
@@ -79,7 +79,7 @@ def test_limit_rows_are_shares_of_the_actuators_limits():
 
 def test_slopes_are_differences_of_the_rows():
     rng = np.random.default_rng(6)
-    linearized = Linearized(PAPER, 1, Margins(), compile=False)
+    linearized = MachineModel(PAPER, 1, Margins(), compile=False)
     x = 0.1 * rng.normal(size=27)
     slopes = linearized(*x.reshape(3, 1, 9)).slopes[0].copy()
     h = 1e-6
@@ -98,4 +98,4 @@ def test_slopes_are_differences_of_the_rows():
 def test_a_missing_subsystem_has_no_rows_and_does_not_move(name, axes, rows):
     platform = get_platform(name)
     assert len(moving_axes(platform)) == axes
-    assert len(Linearized(platform, 1, Margins(), compile=False).upper) == rows
+    assert len(MachineModel(platform, 1, Margins(), compile=False).upper) == rows

@@ -1,4 +1,4 @@
-"""The washout with parameters that are set anew at every step: what an agent that schedules gains acts on."""
+"""Gain scheduling: the classical washout with parameters that an agent changes at every step."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from typing import Any, Final
 import numpy as np
 import warp as wp
 
-from ...envs.errors import ActionError, ConfigurationError, DataError
-from ...envs.platform.machines import Cab
-from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
-from ...envs.simulator.simulator import TIME_STEP
-from ..policy import Array, checked_observation
-from .kernels.blocks import Parameters
-from .parameters import WashoutParameters
-from .policy import ClassicalWashout, kernel_parameters
+from ....envs.errors import ActionError, ConfigurationError, DataError
+from ....envs.platform.machines import Cab
+from ....envs.simulator.kernels.observation import OBSERVATION_SIZE
+from ....envs.simulator.simulator import TIME_STEP
+from ...policy import Array, checked_observation
+from ..kernels.blocks import Parameters
+from .family import ClassicalWashout, WashoutParameters, kernel_parameters
 
 KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "cue_scale": ("force_scale", "rate_scale"),

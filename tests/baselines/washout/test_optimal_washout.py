@@ -14,15 +14,13 @@ from scipy import linalg, signal
 
 from motion_cueing.baselines.tuning.space import WashoutSpace
 from motion_cueing.baselines.washout.batch import WashoutBatch
+from motion_cueing.baselines.washout.families import load_of
 from motion_cueing.baselines.washout.optimal import (
     OptimalParameters,
     OptimalWashout,
     PlaneWeights,
-    load_optimal,
-    optimal_presets,
 )
 from motion_cueing.baselines.washout.optimal.design import Problem, design, discrete, heave, plane, solve, yaw
-from motion_cueing.baselines.washout.optimal.policy import OPTIMAL
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.perception import get_vestibular_model
@@ -30,11 +28,11 @@ from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.settings import save
 from motion_cueing.evaluation import measure, rollout
 
-from .drives import DT, boundless, trace
+from ..drives import DT, boundless, trace
 from .memories import memories
 
 PAPER = get_platform("paper")
-START = load_optimal("optimal-washout")
+START = load_of("optimal", "optimal-washout")
 SPACE = WashoutSpace(START)
 OPEN = replace(START, force_scale=(1.0,) * 3, rate_scale=(1.0,) * 3)
 
@@ -239,7 +237,7 @@ def test_no_design_rings_and_none_runs_away_at_the_limits():
     drive = CueTrace("noise", time, force, rate)
     corners = [rng.integers(0, 2, len(SPACE)).astype(float) for _ in range(20)]
     sets = [SPACE.decode(place) for place in (*corners, *rng.random((10, len(SPACE))))]
-    scores = WashoutBatch(sets, [drive], PAPER, OPTIMAL).scores()
+    scores = WashoutBatch(sets, [drive], PAPER).scores()
     assert np.isfinite(scores.cue_error).all()
     assert scores.at_limit.max() > 0.5
     for parameters in sets:
@@ -333,17 +331,17 @@ def test_dearer_displacement_means_less_of_it_and_dearer_tilt_rate_slower_tilt()
 def test_a_batch_has_the_scores_of_single_rollouts():
     drive = trace(4.0, lambda t: np.column_stack([0.8 * np.sin(2.0 * t), 0.5 * np.sin(3.0 * t)]))
     sets = [START, OPEN]
-    scores = WashoutBatch(sets, [drive], PAPER, OPTIMAL).scores()
+    scores = WashoutBatch(sets, [drive], PAPER).scores()
     for i, parameters in enumerate(sets):
         metrics = measure(rollout(OptimalWashout(parameters), drive, PAPER))
         assert scores.cue_error[i, 0] == pytest.approx(metrics.cue_error, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", optimal_presets())
+@pytest.mark.parametrize("name", ["optimal-washout", "optimal-washout-tuned"])
 def test_presets_round_trip_through_yaml_and_policies_can_be_copied(name, tmp_path):
-    parameters = load_optimal(name)
+    parameters = load_of("optimal", name)
     save(parameters, tmp_path / "mine.yaml")
-    assert load_optimal(tmp_path / "mine.yaml") == parameters
+    assert load_of("optimal", tmp_path / "mine.yaml") == parameters
     policy = OptimalWashout(name)
     assert policy.name == name
     assert copy.deepcopy(policy).parameters == parameters
@@ -351,7 +349,7 @@ def test_presets_round_trip_through_yaml_and_policies_can_be_copied(name, tmp_pa
 
 def test_wrong_parameters_are_refused():
     with pytest.raises(UnknownNameError, match="Did you mean optimal-washout"):
-        load_optimal("optimal-washer")
+        load_of("optimal", "optimal-washer")
     with pytest.raises(UnknownNameError, match="unknown vestibular model 'telbn'"):
         OptimalParameters("x", vestibular="telbn")
     with pytest.raises(ConfigurationError, match="displacement"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
-from motion_cueing.baselines.optimum.plan import Account, Plan, find, keep, key_of, plans_folder
+from motion_cueing.baselines.optimum.plan import Plan, PlanReport, key_of, load_plan, plans_folder, store_plan
 from motion_cueing.baselines.optimum.windows import Planner
 from motion_cueing.baselines.presets import cache_folder
 from motion_cueing.envs.perception import get_vestibular_model
@@ -17,7 +17,7 @@ from motion_cueing.envs.platform import get_platform
 from .drives import surge
 
 OPTIONS = OptimumOptions(effort=1e-3)
-ACCOUNT = Account("J", 0.1, 0.1, 1, 10, 0, 0, 0, 1.5)
+ACCOUNT = PlanReport("J", 0.1, 0.1, 1, 10, 0, 0, 0, 1.5)
 
 
 @pytest.fixture
@@ -36,34 +36,34 @@ def test_a_plan_is_made_once(monkeypatch):
     monkeypatch.setattr(Planner, "plan", refuse)
     again = Optimum(options=OPTIONS).plan(drive)
     assert np.array_equal(again.accelerations, first.accelerations)
-    assert again.account == first.account
+    assert again.report == first.report
     with pytest.raises(AssertionError, match="solved again"):
         Optimum(options=OPTIONS, cached=False).plan(drive)
 
 
 @pytest.mark.parametrize("damage", [b"", b"not a plan", None], ids=["empty", "foreign", "one byte"])
 def test_a_damaged_file_is_no_plan(plan, damage):
-    keep("key", plan)
+    store_plan("key", plan)
     path = plans_folder() / "key.npz"
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(bytes(content) if damage is None else damage)
-    assert find("key", 20) is None
+    assert load_plan("key", 20) is None
 
 
 def test_every_cut_of_a_file_is_no_plan(plan):
-    keep("key", plan)
+    store_plan("key", plan)
     path = plans_folder() / "key.npz"
     content = path.read_bytes()
     for length in range(0, len(content), 97):
         path.write_bytes(content[:length])
-        assert find("key", 20) is None
+        assert load_plan("key", 20) is None
 
 
 def test_a_plan_of_another_length_is_not_taken(plan):
-    keep("key", plan)
-    assert find("key", 21) is None
-    assert np.array_equal(find("key", 20).accelerations, plan.accelerations)
+    store_plan("key", plan)
+    assert load_plan("key", 21) is None
+    assert np.array_equal(load_plan("key", 20).accelerations, plan.accelerations)
 
 
 def test_a_damaged_plan_is_made_anew():
@@ -78,8 +78,8 @@ def test_a_damaged_plan_is_made_anew():
 def test_a_folder_that_cannot_be_written_is_no_error(plan, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("MOTION_CUEING_CACHE", str(tmp_path / "file"))
-    keep("key", plan)
-    assert find("key", 20) is None
+    store_plan("key", plan)
+    assert load_plan("key", 20) is None
 
 
 def test_whatever_a_plan_follows_from_is_in_its_key():

@@ -14,21 +14,29 @@ from motion_cueing.baselines.tuning import methods as evolution
 from motion_cueing.baselines.tuning import methods as method
 from motion_cueing.baselines.tuning import search as search_module
 from motion_cueing.baselines.tuning import space as space_module
-from motion_cueing.baselines.tuning.methods import Descent, Evolution, Found, place_gradient
+from motion_cueing.baselines.tuning.methods import CmaEs, GradientDescent, StepResult, place_gradient
 from motion_cueing.baselines.tuning.objective import LIMIT_STEP, Objective, penalty
 from motion_cueing.baselines.tuning.search import Record, Search, TuningOptions, load_record
-from motion_cueing.baselines.tuning.space import COORDINATES, Coordinate, WashoutSpace
-from motion_cueing.baselines.washout import HighPass, load_washout, washout_presets
+from motion_cueing.baselines.tuning.space import WashoutSpace
+from motion_cueing.baselines.washout import (
+    FAMILIES,
+    Coordinate,
+    Family,
+    HighPass,
+    load_washout,
+    washout_presets,
+)
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.train.config import TrainingConfig
 
-from .drives import trace
+from ..drives import trace
 
 PAPER = get_platform("paper")
 START = load_washout("classical")
 SPACE = WashoutSpace(START)
+CLASSICAL = FAMILIES["classical"]
 DRIVES = [
     trace(6.0, lambda t: np.column_stack([0.5 * np.sin(t), 1.2 * np.sin(0.8 * t)]), name="weave"),
     trace(6.0, lambda t: np.column_stack([np.where(t > 1.0, 1.0, 0.0), 0.0 * t]), name="step"),
@@ -110,12 +118,12 @@ def test_a_limit_costs_more_than_it_gains():
     hard = trace(6.0, lambda t: np.column_stack([np.where(t > 1.0, -9.0, 0.0), 0.0 * t]))
     open_ = replace(START, force_scale=(1.0, 1.0, 1.0), hps=(HighPass(), HighPass()))
     both = Objective([DRIVES[0], hard], PAPER)
-    whole, alone = both.judge([START, open_]), both.judge([START, open_], [0])
+    whole, alone = both.evaluate([START, open_]), both.evaluate([START, open_], [0])
     assert whole.limited[1, 1] > 0.0
     assert whole.at_limit[1] == pytest.approx(whole.limited[1].mean())
     np.testing.assert_array_equal(alone.cost, alone.cue_error)
     # A guard counts for limits, not for J.
-    guarded = both.judge([START, open_], [0], guards=[1])
+    guarded = both.evaluate([START, open_], [0], guards=[1])
     np.testing.assert_array_equal(guarded.cue_error, alone.cue_error)
     assert guarded.cost[1] == alone.cost[1] + penalty(guarded.at_limit)[1] > alone.cost[1] + LIMIT_STEP
     assert guarded.violation[1] == guarded.at_limit[1]
@@ -125,13 +133,13 @@ def test_limits_may_be_met_in_drives_that_are_spared():
     hard = trace(6.0, lambda t: np.column_stack([np.where(t > 1.0, -9.0, 0.0), 0.0 * t]))
     open_ = replace(START, force_scale=(1.0, 1.0, 1.0), hps=(HighPass(), HighPass()))
     strict, spared = (
-        Objective([DRIVES[0], hard], PAPER, spared=which).judge([open_]) for which in ((), (1,))
+        Objective([DRIVES[0], hard], PAPER, exempt=which).evaluate([open_]) for which in ((), (1,))
     )
     assert strict.at_limit[0] == spared.at_limit[0] > 0.0
     assert strict.violation[0] == pytest.approx(strict.at_limit[0])
     assert (spared.violation[0], spared.limited.max()) == (0.0, 0.0)
     assert spared.cost[0] == spared.cue_error[0] == strict.cue_error[0] < strict.cost[0]
-    assert Objective([hard], PAPER, spared=[0]).judge([open_]).violation[0] == 0.0
+    assert Objective([hard], PAPER, exempt=[0]).evaluate([open_]).violation[0] == 0.0
 
 
 def test_hours_are_those_of_the_drives():
@@ -140,19 +148,19 @@ def test_hours_are_those_of_the_drives():
 
 
 def test_the_objective_is_j_or_its_perceived_twin():
-    scores = OBJECTIVE.judge([START])
+    scores = OBJECTIVE.evaluate([START])
     assert scores.cost[0] == scores.cue_error[0] != scores.perceived_error[0]
-    assert Objective(DRIVES, PAPER, "perceived").judge([START]).cost[0] == scores.perceived_error[0]
+    assert Objective(DRIVES, PAPER, "perceived").evaluate([START]).cost[0] == scores.perceived_error[0]
 
 
 def test_a_small_search_improves_on_its_start_and_gives_the_same_again():
     first, again, other = search(), search(), search(seed=1, budget=1e-3)
     for one in (first, again, other):
         assert not one.run()
-    assert first.found == again.found
-    assert first.found[:2] != other.found[:2]
+    assert first.results == again.results
+    assert first.results[:2] != other.results[:2]
     assert first.status.hours >= BUDGET
-    found = OBJECTIVE.judge([first.result("found", ""), START])
+    found = OBJECTIVE.evaluate([first.result("found", ""), START])
     assert found.cost[0] < 0.8 * found.cost[1]
     assert found.at_limit[0] == 0.0
     assert first.status.best == pytest.approx(found.cost[0], rel=1e-3)
@@ -165,19 +173,30 @@ def test_a_search_that_is_taken_up_again_ends_with_the_same_bits(way, tmp_path, 
     short = [trace(1.0, lambda t: np.column_stack([0.5 * np.sin(3.0 * t), 0.0 * t]))] * 2
     whole = search(drives=short, **options)
     whole.run()
-    assert len(whole.found) >= 5
+    assert len(whole.results) >= 5
 
     path = tmp_path / "some.search.json"
     begun = search(path, drives=short, **options)
     asked = iter([False, False, False, False, True])
     assert begun.run(stop=lambda: next(asked))
     record = load_record(path)
-    assert len(record.found) == 4
+    assert len(record.results) == 4
     taken_up = Search(record.options, Objective(short, PAPER), path=path)
     taken_up.resume(record)
     assert not taken_up.run()
-    assert taken_up.found == whole.found == list(load_record(path).found)
+    assert taken_up.results == whole.results == list(load_record(path).results)
     assert taken_up.result("a", "") == whole.result("a", "")
+
+
+def test_a_file_of_before_is_read(tmp_path):
+    """Its results were called ``found``."""
+    path = tmp_path / "some.search.json"
+    search(path, budget=1e-9).run()
+    new = load_record(path)
+    text = path.read_text()
+    path.write_text(text.replace('"results"', '"found"'))
+    assert path.read_text() != text
+    assert load_record(path) == new
 
 
 def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path):
@@ -188,8 +207,8 @@ def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path)
     with pytest.raises(DataError, match="drives, machine, ranges or settings of the search, or the version"):
         search(drives=DRIVES[:1]).resume(record)
     begun = search()
-    begun.run(stop=lambda: len(begun.found) > 1)
-    broken = replace(record, found=(begun.found[0], replace(begun.found[1], values=(1.0, 2.0))))
+    begun.run(stop=lambda: len(begun.results) > 1)
+    broken = replace(record, results=(begun.results[0], replace(begun.results[1], values=(1.0, 2.0))))
     with pytest.raises(DataError, match="does not fit"):
         search().resume(broken)
     path.write_text("{")
@@ -204,16 +223,21 @@ def test_drives_that_changed_or_a_record_that_does_not_fit_are_refused(tmp_path)
             Search(changed, Objective(DRIVES, get_platform("paper"))).resume(record)
 
 
-def wider(coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
-    """The same with another end of the last range."""
+def wider(family: Family) -> tuple[Coordinate, ...]:
+    """Its coordinates with another end of the last range."""
+    coordinates = family.coordinates
     return (*coordinates[:-1], replace(coordinates[-1], high=2.0 * coordinates[-1].high))
 
 
 @pytest.mark.parametrize(
     ("where", "name", "value"),
     [
-        (space_module, "COORDINATES", {"classical": wider(COORDINATES["classical"])}),
-        (space_module, "COORDINATES", {"classical": COORDINATES["classical"][::-1]}),
+        (space_module, "family_of", lambda start: replace(CLASSICAL, coordinates=wider(CLASSICAL))),
+        (
+            space_module,
+            "family_of",
+            lambda start: replace(CLASSICAL, coordinates=CLASSICAL.coordinates[1:]),
+        ),
         (evolution, "STEP", 0.2),
         (evolution, "DRIVES", 12),
         (evolution, "GUARDS", 12),
@@ -226,7 +250,7 @@ def wider(coordinates: tuple[Coordinate, ...]) -> tuple[Coordinate, ...]:
 def test_a_search_is_not_taken_up_by_another_one(monkeypatch, where, name, value):
     begun = search(budget=1e-9)
     begun.run()
-    record = Record(begun.options, "paper", "sedan", begun._inputs, tuple(begun.found))
+    record = Record(begun.options, "paper", "sedan", begun._inputs, tuple(begun.results))
     search().resume(record)
     monkeypatch.setattr(where, name, value)
     with pytest.raises(DataError, match="have changed since this search was begun; begin it anew"):
@@ -248,11 +272,11 @@ def test_the_gradient_in_the_cube_is_that_of_differences():
     place, h = np.clip(SPACE.encode(START), 0.05, 0.95), 1e-4
     cost, gradient = place_gradient(SPACE, place, OBJECTIVE, [0])
     weave = Objective(DRIVES[:1], PAPER)
-    assert cost == pytest.approx(weave.judge([SPACE.decode(place)]).cue_error[0], rel=0.01)
+    assert cost == pytest.approx(weave.evaluate([SPACE.decode(place)]).cue_error[0], rel=0.01)
     names = [c.path for c in SPACE.coordinates]
     for name in ("force_scale.1", "hps.1.frequency", "hpi.1.damping", "tilt.low_pass.frequency"):
         step = np.where(np.array(names) == name, h, 0.0)
-        sides = [weave.judge([SPACE.decode(place + s * step)]).cue_error[0] for s in (1.0, -1.0)]
+        sides = [weave.evaluate([SPACE.decode(place + s * step)]).cue_error[0] for s in (1.0, -1.0)]
         expected = (sides[0] - sides[1]) / (2.0 * h)
         assert abs(expected) > 1e-3
         # The tape averages over the steps, the score also over the sample before the first.
@@ -261,7 +285,7 @@ def test_the_gradient_in_the_cube_is_that_of_differences():
 
 def test_descent_goes_down_and_never_keeps_what_is_worse():
     goal = np.linspace(0.2, 0.8, 4)
-    way = Descent(np.full(4, 0.5), seed=0)
+    way = GradientDescent(np.full(4, 0.5), seed=0)
 
     def bowl(place):
         """In place of a simulation."""
@@ -271,33 +295,33 @@ def test_descent_goes_down_and_never_keeps_what_is_worse():
     while not way.converged:
         place = way._place
         if way._tries:
-            way.tell(Found(0.0, (bowl(place),), (0.0,)))
+            way.update(StepResult(0.0, (bowl(place),), (0.0,)))
             costs.append(way.best[0])
         else:
-            way.tell(Found(0.0, (bowl(place), *(2.0 * (place - goal)).tolist())))
+            way.update(StepResult(0.0, (bowl(place), *(2.0 * (place - goal)).tolist())))
     assert costs == sorted(costs, reverse=True)
     np.testing.assert_allclose(way.best[1], goal, atol=0.01)
 
 
 def test_descent_goes_back_from_a_set_that_meets_a_limit_however_cheap():
-    way = Descent(np.full(2, 0.5), seed=0)
-    way.tell(Found(0.0, (9.0,), (0.0,)))
+    way = GradientDescent(np.full(2, 0.5), seed=0)
+    way.update(StepResult(0.0, (9.0,), (0.0,)))
     for _ in range(method.TRY_EVERY):
-        way.tell(Found(0.0, (9.0, 1.0, -1.0)))
+        way.update(StepResult(0.0, (9.0, 1.0, -1.0)))
     assert way._place.tolist() != [0.5, 0.5]
-    way.tell(Found(0.0, (1.01,), (1e-5,)))
+    way.update(StepResult(0.0, (1.01,), (1e-5,)))
     assert (way.best[0], way._place.tolist()) == (9.0, [0.5, 0.5])
 
 
 def test_of_sets_tried_the_best_meets_no_limit_if_any_does_not():
-    way = Evolution(np.full(3, 0.5), seed=0)
-    way.tell(Found(0.0, (5.0, 0.1), (0.1,)))
+    way = CmaEs(np.full(3, 0.5), seed=0)
+    way.update(StepResult(0.0, (5.0, 0.1), (0.1,)))
     assert way.best[0] == 5.0  # there is no other yet
 
     def tried(costs, violations):
         for _ in range(method.TRY_EVERY):
-            way.tell(Found(0.0, tuple(range(len(way._asked)))))
-        way.tell(Found(0.0, (*costs, 0.0), violations))
+            way.update(StepResult(0.0, tuple(range(len(way._generation)))))
+        way.update(StepResult(0.0, (*costs, 0.0), violations))
         return way.best[0]
 
     assert tried((8.0, 4.0), (0.0, 1e-5)) == 8.0
@@ -306,15 +330,15 @@ def test_of_sets_tried_the_best_meets_no_limit_if_any_does_not():
 
 
 def test_drives_in_which_limits_are_met_become_guards():
-    way = Evolution(np.full(3, 0.5), seed=0)
+    way = CmaEs(np.full(3, 0.5), seed=0)
     limited = np.zeros(40)
     limited[[3, 7]] = 0.1, 0.2
-    way.tell(Found(0.0, (5.0, *limited), (0.3,)))
+    way.update(StepResult(0.0, (5.0, *limited), (0.3,)))
     assert way._guards == [7, 3]
     for _ in range(method.TRY_EVERY):
-        way.tell(Found(0.0, tuple(range(len(way._asked)))))
+        way.update(StepResult(0.0, tuple(range(len(way._generation)))))
     limited[[3, 7]] = 0.2, 0.0
-    way.tell(Found(0.0, (6.0, 7.0, *limited), (0.1, 0.1)))
+    way.update(StepResult(0.0, (6.0, 7.0, *limited), (0.1, 0.1)))
     assert way._guards == [3, 7]
     assert way.best[0] == 5.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -12,13 +13,12 @@ from motion_cueing.baselines.mpc import (
     Forecast,
     Margins,
     MpcParameters,
-    NmpcParameters,
     load_mpc,
     mpc_presets,
     solver,
 )
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.envs.settings import load, save
+from motion_cueing.envs.settings import save
 
 
 @pytest.mark.parametrize(
@@ -36,17 +36,13 @@ from motion_cueing.envs.settings import load, save
         ({"forecast": {"preview": -1.0}}, "preview"),
         ({"margins": {"rate": 1.5}}, "rate"),
         ({"weights": {"tilt": {"position": float("nan")}}}, "position"),
+        ({"iterations": 0}, "iterations"),
+        ({"tolerance": 0.0}, "tolerance"),
     ],
 )
 def test_bad_parameters_are_refused(fields, told):
     with pytest.raises(ConfigurationError, match=told):
         MpcParameters(**fields)
-
-
-@pytest.mark.parametrize(("fields", "told"), [({"iterations": 0}, "iterations"), ({"tolerance": 0.0}, "tol")])
-def test_bad_parameters_of_the_nonlinear_one_are_refused(fields, told):
-    with pytest.raises(ConfigurationError, match=told):
-        NmpcParameters(**fields)
 
 
 def test_an_unknown_model_of_perception_is_named():
@@ -59,19 +55,32 @@ def test_an_unknown_model_of_perception_is_named():
 
 
 def test_parameters_round_trip_through_yaml(tmp_path):
-    mine = NmpcParameters(
-        mpc=MpcParameters(nodes=(0.02, 0.5), forecast=Forecast(preview=0.4), margins=Margins(rate=0.5)),
+    mine = MpcParameters(
+        nodes=(0.02, 0.5),
+        forecast=Forecast(preview=0.4),
+        margins=Margins(rate=0.5),
+        nonlinear=True,
         iterations=3,
         tolerance=0.1,
     )
     save(mine, tmp_path / "mine.yaml")
-    assert load(NmpcParameters, tmp_path / "mine.yaml") == mine
-    save(mine.mpc, tmp_path / "linear.yaml")
-    assert load_mpc(tmp_path / "linear.yaml") == mine.mpc
+    assert load_mpc(tmp_path / "mine.yaml") == mine
+
+
+def test_a_file_of_the_nonlinear_controller_of_before_is_read(tmp_path):
+    file = tmp_path / "old.yaml"
+    file.write_text("algorithm: nmpc\nmpc: {nodes: [0.02, 0.5], forecast: {preview: 0.4}}\niterations: 3\n")
+    expected = MpcParameters(nodes=(0.02, 0.5), forecast=Forecast(preview=0.4), nonlinear=True, iterations=3)
+    assert load_mpc(file) == expected
+    file.write_text("algorithm: nmpc\nmpc: 3\n")
+    with pytest.raises(ConfigurationError, match=r"old\.yaml: field 'mpc'"):
+        load_mpc(file)
 
 
 def test_sets_go_by_name_and_differ_in_what_they_know():
-    assert mpc_presets() == ["mpc", "mpc-full", "mpc-preview"]
+    assert mpc_presets() == ["mpc", "mpc-full", "mpc-preview", "nmpc", "nmpc-preview"]
+    for name in ("mpc", "mpc-preview"):
+        assert load_mpc(f"n{name}") == replace(load_mpc(name), nonlinear=True)
     known = [load_mpc(name).forecast.preview for name in ("mpc", "mpc-preview")]
     assert known == [0.0, 2.0]
     full = load_mpc("mpc-full")

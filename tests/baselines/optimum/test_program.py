@@ -10,9 +10,9 @@ from motion_cueing.baselines.optimum.program import (
     interval,
     mean_accelerations,
     node_limits,
-    sensed_error,
+    perceived_error_filter,
 )
-from motion_cueing.baselines.optimum.transcription import Transcription, Watch, blocks_of
+from motion_cueing.baselines.optimum.transcription import SolveMonitor, Transcription, blocks_of
 from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.perception import get_vestibular_model, vestibular_model_names
 from motion_cueing.envs.platform import get_platform
@@ -23,10 +23,10 @@ INTERVALS = 3
 def program(objective: str, effort: float = 0.3) -> Transcription:
     machine = SymbolicMachine(get_platform("24-inch"))
     options = OptimumOptions(objective=objective, steps=2, effort=effort)
-    sensed = None if objective == "J" else sensed_error(get_vestibular_model("telban"), 0.01)
-    part = interval(machine, options, sensed, 0.01)
+    perceived = None if objective == "J" else perceived_error_filter(get_vestibular_model("telban"), 0.01)
+    part = interval(machine, options, perceived, 0.01)
     limits = node_limits(machine, part.q, part.v, part.a, 0.02, 0.01)
-    return Transcription(blocks_of(part, limits, options), INTERVALS, {}, Watch())
+    return Transcription(blocks_of(part, limits, options), INTERVALS, {}, SolveMonitor())
 
 
 def point(made: Transcription, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -93,13 +93,13 @@ def test_means_of_straight_lines_integrate_to_their_area():
 
 
 @pytest.mark.parametrize("name", vestibular_model_names())
-def test_the_sensed_error_is_that_of_the_published_transfer_functions(name):
+def test_the_perceived_error_is_that_of_the_published_transfer_functions(name):
     """Its response to an oscillating error against the transfer functions at that frequency."""
     model, dt, frequency = get_vestibular_model(name), 0.01, 2.0
-    sensed = sensed_error(model, dt)
+    perceived = perceived_error_filter(model, dt)
     z = np.exp(1j * frequency * dt)
-    states = np.linalg.solve(z * np.eye(len(sensed.a)) - sensed.a, sensed.b)
-    found = np.diag(sensed.c @ states) + sensed.d
+    states = np.linalg.solve(z * np.eye(len(perceived.a)) - perceived.a, perceived.b)
+    found = np.diag(perceived.c @ states) + perceived.d
     rows = [model.otoliths.transfer_function()] * 3 + [model.canals.transfer_function(i) for i in range(3)]
     s = 1j * frequency
     wanted = np.array([np.polyval(top, s) / np.polyval(bottom, s) for top, bottom in rows])

@@ -1,0 +1,28 @@
+"""The paper's classical washout, an oracle of it with one set a maneuver, and its gain-scheduled form."""
+
+from .family import (
+    ClassicalWashout,
+    HighPass,
+    LowPass,
+    TiltCoordination,
+    WashoutParameters,
+    load_washout,
+    washout_presets,
+)
+from .per_maneuver import PerManeuverParameters, PerManeuverWashout, load_per_maneuver, tuned_maneuvers
+from .scheduled import ScheduledWashout
+
+__all__ = [
+    "ClassicalWashout",
+    "HighPass",
+    "LowPass",
+    "PerManeuverParameters",
+    "PerManeuverWashout",
+    "ScheduledWashout",
+    "TiltCoordination",
+    "WashoutParameters",
+    "load_per_maneuver",
+    "load_washout",
+    "tuned_maneuvers",
+    "washout_presets",
+]
