@@ -7,14 +7,13 @@ from pathlib import Path
 
 from ..envs.storage import check_folder, check_own_json, write_bytes
 from ..evaluation.metrics import Criteria
-from ..evaluation.provenance import head_of
 from ..evaluation.reporting.text import save_markdown, table_console
 from ..evaluation.studies.results import (
     StudyResults,
     common_maneuvers,
     matrix_table,
     print_study,
-    share_tables,
+    score_tables,
     summarize,
 )
 from ..evaluation.studies.store import check_kept, forget_kept
@@ -81,7 +80,7 @@ def _write(results: StudyResults, out: Path, title: str, ratios: bool) -> None:
     results.save_json(out / "study.json")
     results.save_csv(out / "study.csv")
     left_out = [f"Left out: {line}" for line in results.told_left_out()]
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results), *left_out)
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *left_out)
 
 
 def results_of(
@@ -90,7 +89,7 @@ def results_of(
     """The results of an outcome, with what made them."""
     criteria = Criteria()
     return StudyResults(
-        **head_of(StudyResults, words),
+        **StudyResults.head(words),
         conditions={condition.name: condition.description for condition in conditions},
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),

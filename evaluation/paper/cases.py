@@ -22,9 +22,9 @@ from ...envs.car import get_car
 from ...envs.cues import GRAVITY
 from ...envs.maneuvers import get_maneuver
 from ...envs.platform import get_platform
+from ...envs.provenance import versions
 from ...envs.settings import to_dict
 from ...envs.storage import write_bytes, write_text
-from ..provenance import versions
 from ..reporting.figures import CAR, new_figure, png, styled
 from ..reporting.text import number
 from ..rollout import rollout

@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from ..reporting.figures import CAR, FLOOR, LOWEST_SHARE, line_styles, new_figure, png, styled
+from ..reporting.figures import CAR, FLOOR, LOWEST_SCORE, line_styles, new_figure, png, styled
 from ..reporting.text import how_many, number
 from .results import StudyResults, Summary
 
@@ -27,12 +27,12 @@ _BRIGHT: Final = 2.4
 def lines_figure(results: StudyResults) -> bytes | None:
     """A PNG of J and perceived J of each policy over the conditions, or None where nothing was driven.
 
-    Panels of the share of the gap stand beside them where the references are among the policies.
+    Panels of the normalized score stand beside them where the references are among the policies.
     """
     if not results.summaries:
         return None
     found = [s for policies in results.summaries.values() for s in policies.values()]
-    shares = any(s.share is not None or s.perceived_share is not None for s in found)
+    shares = any(s.normalized_score is not None or s.perceived_normalized_score is not None for s in found)
     columns = 2 if shares else 1
     with styled():
         figure = new_figure(3.0 + columns * max(5.0, 1.1 * len(results.conditions) + 2.0), 8.5)
@@ -60,17 +60,22 @@ def _errors(axes: Axes, results: StudyResults, perceived: bool) -> None:
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title(
-        "Perceived J" if perceived else "J at the cab (logarithmic; below 1 within what a driver minds)"
+        "Perceived J" if perceived else "J at the cab (logarithmic; below 1 within the indifference zone)"
     )
 
 
 def _shares(axes: Axes, results: StudyResults, perceived: bool) -> None:
-    _lines(axes, results, lambda s: s.perceived_share if perceived else s.share, LOWEST_SHARE)
+    _lines(
+        axes,
+        results,
+        lambda s: s.perceived_normalized_score if perceived else s.normalized_score,
+        LOWEST_SCORE,
+    )
     axes.axhline(0.0, color=CAR, linewidth=0.8)
     axes.axhline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
-    axes.set_ylim(LOWEST_SHARE - 0.1, 1.25)
-    about = "Perceived share of the gap" if perceived else "Share of the gap"
-    axes.set_title(f"{about}: 0 tuned washout, 1 optimum")
+    axes.set_ylim(LOWEST_SCORE - 0.1, 1.25)
+    about = "Perceived score" if perceived else "Normalized score"
+    axes.set_title(f"{about}: 0 reference washout, 1 optimum")
     if not any(np.isfinite(line.get_ydata(orig=False)).any() for line in axes.get_lines()[:-2]):
         axes.text(0.5, 0.4, "its optimum is not among the policies", transform=axes.transAxes, ha="center")
 
@@ -140,4 +145,4 @@ def _told(found: Summary | None, first: bool) -> str:
     if found is None:
         return "–"
     ratio = "" if first or found.ratio is None else f"×{found.ratio:.2f}, "
-    return f"{number(found.cue_error)}\n{ratio}limits {found.at_limit:.1%}"
+    return f"{number(found.cue_error)}\n{ratio}limits {found.metrics['at_limit']:.1%}"

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
 from rich.markup import escape
 
-from ...envs.settings import configuration, to_dict
-from ..comparison import Share, shares
-from ..metrics import Criteria, Metrics
-from ..reporting.tables import SHARE_HEADER, has_shares, share_cells
-from ..reporting.text import NOTHING, TextTable, degrees, fraction, how_many, number, percent, print_table
-from ..results import save_rows
+from ...envs.settings import configuration
+from ..comparison import normalized_scores
+from ..metrics import METRICS, Criteria, Metrics, over_drives
+from ..reporting.tables import SCORES, Cell, policy_table
+from ..reporting.text import NOTHING, TextTable, fraction, how_many, number, percent, print_table
+from ..results import save_frame
 from ..saved import Headed
 from ..suite import print_troubles
 
-SCHEMA: Final = 1
-"""Version of ``study.json``."""
+SCHEMA: Final = 2
+"""Version of ``study.json``; version 1 is read, too."""
 
 
 @configuration
@@ -44,26 +44,34 @@ class Summary:
     """One policy under one condition, over the drives that every pair finished.
 
     Args:
-        cue_error: Mean J.
-        perceived_cue_error: Mean perceived J.
-        share: Of the gap between the references under this condition; None where one is missing.
-        perceived_share: The same of the perceived J.
+        metrics: Each metric over the drives, as it declares; see ``metrics.over_drives``.
+        normalized_score: Of the mean J under this condition; None where a reference is missing.
+        perceived_normalized_score: The same of the perceived J.
         ratio: Mean J over that under the first condition; None where that is missing or 0.
-        false_cues: Mean share of time with a false cue.
-        tilt_rate_peak: Largest of all drives, rad/s.
-        at_limit: Mean share of time with any actuator at any limit.
         most_limited: Largest share of time at a limit of a drive.
     """
 
-    cue_error: float
-    perceived_cue_error: float
-    share: float | None
-    perceived_share: float | None
+    metrics: dict[str, float | None]
+    normalized_score: float | None
+    perceived_normalized_score: float | None
     ratio: float | None
-    false_cues: float
-    tilt_rate_peak: float
-    at_limit: float
     most_limited: float
+
+    @property
+    def cue_error(self) -> float:
+        """Mean J."""
+        return self.metrics["cue_error"] or 0.0
+
+    @property
+    def perceived_cue_error(self) -> float:
+        """Mean perceived J."""
+        return self.metrics["perceived_cue_error"] or 0.0
+
+    @property
+    def row(self) -> dict[str, float | None]:
+        """Every number by name, in SI units."""
+        others = ("normalized_score", "perceived_normalized_score", "ratio", "most_limited")
+        return {**self.metrics, **{name: getattr(self, name) for name in others}}
 
 
 @configuration
@@ -84,6 +92,7 @@ class StudyResults(Headed):
 
     what = "a study"
     version = SCHEMA
+    oldest = 1
 
     conditions: dict[str, str]
     policies: tuple[str, ...]
@@ -114,16 +123,37 @@ class StudyResults(Headed):
 
     def save_csv(self, path: Path) -> None:
         """Write ``study.csv``: a row a condition and policy, with the reason where it was left out."""
-        save_rows(list(self._rows()), path)
+        import pandas as pd
 
-    def _rows(self) -> Iterator[Mapping[str, Any]]:
-        empty = dict.fromkeys(Summary.__dataclass_fields__)
-        for condition in self.conditions:
-            for policy in self.policies:
-                found = self.summaries.get(condition, {}).get(policy)
-                numbers = empty if found is None else to_dict(found)
-                reason = self.left_out.get(condition, {}).get(policy)
-                yield {"condition": condition, "policy": policy, **numbers, "left_out": reason}
+        rows = [
+            {
+                "condition": condition,
+                "policy": policy,
+                **(
+                    self.summaries[condition][policy].row
+                    if policy in self.summaries.get(condition, {})
+                    else {}
+                ),
+                "left_out": self.left_out.get(condition, {}).get(policy),
+            }
+            for condition in self.conditions
+            for policy in self.policies
+        ]
+        save_frame(pd.DataFrame(rows), path)
+
+    @classmethod
+    def upgrade(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Version 1 named each metric of a summary as a field."""
+        for policies in values["summaries"].values() if values["schema"] == 1 else ():
+            for name, old in policies.items():
+                policies[name] = {
+                    "normalized_score": old.pop("share"),
+                    "perceived_normalized_score": old.pop("perceived_share"),
+                    "ratio": old.pop("ratio"),
+                    "most_limited": old.pop("most_limited"),
+                    "metrics": old,
+                }
+        return values
 
 
 def common_maneuvers(metrics: Mapping[str, Mapping[str, Mapping[str, Metrics]]]) -> tuple[str, ...]:
@@ -139,47 +169,32 @@ def summarize(
 
     Args:
         metrics: By condition, policy and maneuver; the first condition is what others are compared with.
-        criteria: For the references of the share.
+        criteria: For the references of the score.
     """
     common = common_maneuvers(metrics)
     if not common:
         return {}
+    references = (criteria or Criteria()).references
     nominal: dict[str, float] = {}
-    found: dict[str, dict[str, Summary]] = {}
+    summaries: dict[str, dict[str, Summary]] = {}
     for i, (condition, policies) in enumerate(metrics.items()):
-        chosen = {name: [drives[m] for m in common] for name, drives in policies.items() if drives}
-        errors = {name: _mean([m.cue_error for m in drives]) for name, drives in chosen.items()}
+        drives = {name: [each[m] for m in common] for name, each in policies.items() if each}
+        combined = {name: over_drives(each) for name, each in drives.items()}
+        errors = {name: each["cue_error"] or 0.0 for name, each in combined.items()}
+        perceived = {name: each["perceived_cue_error"] or 0.0 for name, each in combined.items()}
         nominal = errors if i == 0 else nominal
-        found[condition] = _condition(chosen, errors, nominal, criteria or Criteria())
-    return found
-
-
-def _condition(
-    drives: Mapping[str, list[Metrics]],
-    errors: Mapping[str, float],
-    nominal: Mapping[str, float],
-    criteria: Criteria,
-) -> dict[str, Summary]:
-    perceived = {name: _mean([m.perceived_cue_error for m in each]) for name, each in drives.items()}
-    gap = shares(errors, perceived, criteria.references)
-    return {
-        name: Summary(
-            cue_error=errors[name],
-            perceived_cue_error=perceived[name],
-            share=gap[name].cue_error,
-            perceived_share=gap[name].perceived_cue_error,
-            ratio=errors[name] / nominal[name] if nominal.get(name) else None,
-            false_cues=_mean([m.false_cues for m in each]),
-            tilt_rate_peak=max(m.tilt_rate_peak for m in each),
-            at_limit=_mean([m.at_limit for m in each]),
-            most_limited=max(m.at_limit for m in each),
-        )
-        for name, each in drives.items()
-    }
-
-
-def _mean(values: list[float]) -> float:
-    return sum(values) / len(values)
+        scores = normalized_scores(errors, perceived, references)
+        summaries[condition] = {
+            name: Summary(
+                metrics=combined[name],
+                normalized_score=scores[name].cue_error,
+                perceived_normalized_score=scores[name].perceived_cue_error,
+                ratio=errors[name] / nominal[name] if nominal.get(name) else None,
+                most_limited=max(m.at_limit for m in each),
+            )
+            for name, each in drives.items()
+        }
+    return summaries
 
 
 # The tables of a study.
@@ -211,66 +226,42 @@ def _cell(results: StudyResults, condition: str, policy: str, ratios: bool) -> s
     return f"{number(found.cue_error)} (×{found.ratio:.2f})"
 
 
-def share_tables(results: StudyResults) -> list[TextTable]:
-    """Share of the gap of every policy under every condition, of J and of the perceived J, if there is any.
+def score_tables(results: StudyResults) -> list[TextTable]:
+    """Normalized score of every policy under every condition, of J and of the perceived J, if there is any.
 
-    A share is of the gap under its own condition.
+    A score is measured between the references under its own condition.
     """
-    kinds = (("Share of the gap", False), ("Perceived share of the gap", True))
-    made = [_share_table(results, title, perceived) for title, perceived in kinds]
-    return [table for table in made if any(set(row[1:]) != {NOTHING} for row in table.rows)]
-
-
-def _share_table(results: StudyResults, title: str, perceived: bool) -> TextTable:
-    rows = []
-    for policy in results.driven:
-        found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
-        shares = [None if s is None else s.perceived_share if perceived else s.share for s in found]
-        rows.append((policy, *(fraction(share) for share in shares)))
-    return TextTable(title, ("policy", *results.conditions), tuple(rows))
+    tables = []
+    for name, title in SCORES.items():
+        rows = []
+        for policy in results.driven:
+            summaries = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
+            rows.append((policy, *(fraction(None if s is None else s.row[name]) for s in summaries)))
+        if any(set(row[1:]) != {NOTHING} for row in rows):
+            tables.append(TextTable(title.capitalize(), ("policy", *results.conditions), tuple(rows)))
+    return tables
 
 
 def condition_table(results: StudyResults, condition: str) -> TextTable:
     """Every policy under one condition, best first; those left out are missing."""
-    found = results.summaries.get(condition, {})
-    gaps = {name: Share(s.share, s.perceived_share) for name, s in found.items()}
-    shown = has_shares(gaps.values())
-    order = sorted(found, key=lambda name: found[name].cue_error)
-    header = (
-        "policy",
-        "J",
-        "perceived J",
-        *(SHARE_HEADER if shown else ()),
-        f"J over {next(iter(results.conditions))}",
-        "false cues %",
-        "tilt rate peak deg/s",
-        "at a limit %",
-        "worst drive %",
-    )
-    rows = (_row(name, found[name], share_cells(gaps[name]) if shown else ()) for name in order)
-    title = f"{condition}: {results.conditions[condition]}"
-    return TextTable(title, header, tuple(rows), (0,) if order else ())
+    import pandas as pd
 
-
-def _row(name: str, s: Summary, shares: tuple[str, ...]) -> tuple[str, ...]:
-    return (
-        name,
-        number(s.cue_error),
-        number(s.perceived_cue_error),
-        *shares,
-        NOTHING if s.ratio is None else f"{s.ratio:.2f}",
-        percent(s.false_cues),
-        degrees(s.tilt_rate_peak),
-        percent(s.at_limit),
-        percent(s.most_limited),
-    )
+    summaries = results.summaries.get(condition, {})
+    order = sorted(summaries, key=lambda name: summaries[name].cue_error)
+    columns = ["policy", *METRICS, *SCORES, "ratio", "most_limited"]
+    rows = pd.DataFrame([{"policy": name, **summaries[name].row} for name in order], columns=columns)
+    more: dict[str, Cell] = {
+        f"J over {next(iter(results.conditions))}": lambda row: fraction(row["ratio"]),
+        "worst drive at a limit %": lambda row: percent(row["most_limited"]),
+    }
+    return policy_table(f"{condition}: {results.conditions[condition]}", rows, "study", more)
 
 
 def print_study(console: Console, results: StudyResults, title: str, ratios: bool) -> None:
-    """Show a table a condition, the matrices of J and shares, and what was counted, left out or failed."""
+    """Show a table a condition, the matrices of J and scores, and what was counted, left out or failed."""
     for condition in results.conditions:
         print_table(console, condition_table(results, condition))
-    for table in (matrix_table(results, title, ratios), *share_tables(results)):
+    for table in (matrix_table(results, title, ratios), *score_tables(results)):
         print_table(console, table)
     counted = [
         (policy, f"{condition} {maneuver}", found)

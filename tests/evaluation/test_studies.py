@@ -25,7 +25,7 @@ from motion_cueing.evaluation.studies.results import (
     condition_table,
     matrix_table,
     print_study,
-    share_tables,
+    score_tables,
 )
 from motion_cueing.evaluation.studies.store import identity
 from motion_cueing.evaluation.studies.study import Condition, run_study
@@ -210,13 +210,13 @@ def test_summaries_are_means_with_ratio_and_share(roll, tmp_path):
     whole, locked = results.summaries.values()
     metrics = results.metrics["paper"]["mine"]
     assert whole["mine"].cue_error == pytest.approx(np.mean([m.cue_error for m in metrics.values()]))
-    assert (whole["classical-tuned"].share, whole["optimum"].share) == (0.0, 1.0)
-    assert whole["mine"].perceived_share is None
+    assert (whole["classical-tuned"].normalized_score, whole["optimum"].normalized_score) == (0.0, 1.0)
+    assert whole["mine"].perceived_normalized_score is None
     assert locked["mine"].ratio == pytest.approx(locked["mine"].cue_error / whole["mine"].cue_error)
     assert locked["no-motion"].ratio == 1.0
     table = condition_table(results, "paper")
     assert table.rows[0][0] == "optimum"
-    assert table.rows[0][table.header.index("share of the gap")] == "1.00"
+    assert table.rows[0][table.header.index("normalized score")] == "1.00"
     cell = matrix_table(results, "t", True).rows[2][2]
     assert cell.endswith(f"(×{locked['mine'].ratio:.2f})")
 
@@ -246,9 +246,9 @@ def test_results_are_written_read_and_drawn(roll, tmp_path):
 def test_the_share_under_every_condition_has_a_table_and_a_panel(roll, tmp_path, monkeypatch):
     results, _ = study_of(CONDITIONS, tmp_path)
     # The perceived optimum is not among the policies.
-    (table,) = share_tables(results)
+    (table,) = score_tables(results)
     assert table.header == ("policy", *results.conditions)
-    whole, locked = (found["mine"].share for found in results.summaries.values())
+    whole, locked = (found["mine"].normalized_score for found in results.summaries.values())
     assert table.rows[2] == ("mine", f"{whole:.2f}", f"{locked:.2f}")
     drawn = []
     monkeypatch.setattr(study_figures, "png", lambda figure: drawn.append(figure) or b"")
@@ -256,14 +256,17 @@ def test_the_share_under_every_condition_has_a_table_and_a_panel(roll, tmp_path,
     without, _ = study_of(CONDITIONS, tmp_path, {"no-motion": "no-motion", "mine": "mine"})
     lines_figure(without)
     assert [len(figure.axes) for figure in drawn] == [4, 2]
-    assert drawn[0].axes[1].get_title("left").startswith("Share of the gap")
-    assert share_tables(without) == []
+    assert drawn[0].axes[1].get_title("left").startswith("Normalized score")
+    assert score_tables(without) == []
 
 
 def test_a_value_near_0_does_not_squeeze_the_others(roll, tmp_path, monkeypatch):
     results, _ = study_of(CONDITIONS, tmp_path)
     summaries = {
-        name: {**found, "optimum": replace(found["optimum"], cue_error=1e-6)}
+        name: {
+            **found,
+            "optimum": replace(found["optimum"], metrics={**found["optimum"].metrics, "cue_error": 1e-6}),
+        }
         for name, found in results.summaries.items()
     }
     drawn = []
