@@ -683,10 +683,11 @@ class Metrics:
         "Longest step.",
         "s", "step max", MICROSECONDS, max, tables=("benchmark",), default=None,
     )  # fmt: skip
-    axes: dict[str, AxisMetrics] = metric(lambda d: d.axis_metrics, "The metrics of each axis.")
+    axes: dict[str, AxisMetrics] = metric(lambda d: d.axis_metrics, "The metrics of each axis.", better="")
     actuators: dict[str, ActuatorMetrics] = metric(
         lambda d: {name: _measured(ActuatorMetrics, signals) for name, signals in d.actuators.items()},
         "The metrics of each actuator.",
+        better="",
     )
     travel: dict[str, float] = metric(
         lambda d: dict(zip(AXES[2:8], np.abs(d.trajectory.hexapod).max(axis=0).tolist(), strict=True)),
@@ -699,6 +700,10 @@ class Metrics:
         """The axis with the largest part of J."""
         return max(self.axes, key=lambda axis: self.axes[axis].cue_error)
 
+
+for _cls in (AxisMetrics, ActuatorMetrics, Metrics):
+    _arguments = [f"    {one.name}: {one.definition}" for one in declared(_cls)]
+    _cls.__doc__ = "\n".join([f"{_cls.__doc__}\n\nArgs:", *_arguments])
 
 _NESTED: Final = ("axes", "actuators", "travel")
 """Fields of :class:`Metrics` that hold more than one number."""
