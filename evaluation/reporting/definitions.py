@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..metrics import ActuatorMetrics, AxisMetrics, Criteria, Metrics, declared
+from ..metrics import ActuatorMetrics, AxisMetrics, Criteria, Metrics, References, declared
 from .text import NOTHING, TextTable, markdown
 
 _BETTER: Final = {"lower": "Lower is better.", "higher": "Higher is better.", "": ""}
@@ -51,7 +51,7 @@ def _thresholds() -> str:
     for field in dataclasses.fields(Criteria):
         value = getattr(criteria, field.name)
         values = (
-            dataclasses.astuple(value) if dataclasses.is_dataclass(value) else np.atleast_1d(value).tolist()
+            dataclasses.astuple(value) if isinstance(value, References) else np.atleast_1d(value).tolist()
         )
         shown = [f"`{one}`" if isinstance(one, str) else f"{one:.4g}" for one in values]
         rows.append((f"`{field.name}`", ", ".join(shown), " ".join(meanings[field.name].split())))

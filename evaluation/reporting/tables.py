@@ -42,9 +42,7 @@ def policy_table(title: str, frame: pd.DataFrame, table: Table, more: Mapping[st
     if "worst_axis" in frame:
         columns["worst axis"] = _worst_axis
     columns |= {**metrics, **more}
-    records: list[dict[str, Any]] = [
-        dict(zip(frame, row, strict=True)) for row in frame.itertuples(index=False)
-    ]
+    records: list[Any] = frame.to_dict("records")
     rows = [tuple(cell(row) for cell in columns.values()) for row in records]
     best = (int(frame["cue_error"].argmin()),) if rows else ()
     return TextTable(title, tuple(columns), tuple(rows), best)
