@@ -405,7 +405,6 @@ def mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
 
 
-Aggregate = Callable[[Sequence[float]], float]
 Table = Literal["drive", "benchmark", "study"]
 """The tables of one maneuver, of the benchmark, and of a condition of a study."""
 EVERY_TABLE: Final[tuple[Table, ...]] = ("drive", "benchmark", "study")
@@ -436,18 +435,31 @@ OF_AXIS: Final = Display("", number)
 
 @dataclasses.dataclass(frozen=True)
 class Metric:
-    """One metric; see :func:`metric`."""
+    """The declaration of a metric.
 
-    name: str
+    Args:
+        measure: Gives the value from the signals of a drive, an axis or an actuator.
+        definition: One to four sentences, for the page of metrics.
+        unit: SI, of the value in files.
+        header: In tables, without unit. A metric without header is in files only.
+        display: How tables show the value.
+        over_drives: Makes one value of those of several drives.
+        better: The better direction, where there is one.
+        source: Literature.
+        tables: The tables in which it is a column.
+        name: Of the field.
+    """
+
     measure: Callable[[Any], Any]
     definition: str
-    unit: str
-    header: str
-    display: Display
-    over_drives: Aggregate
-    better: Literal["lower", "higher", ""]
-    source: str
-    tables: tuple[Table, ...]
+    unit: str = "1"
+    header: str = ""
+    display: Display = PLAIN
+    over_drives: Callable[[Sequence[float]], float] = mean
+    better: Literal["lower", "higher", ""] = "lower"
+    source: str = ""
+    tables: tuple[Table, ...] = ()
+    name: str = ""
 
     @property
     def title(self) -> str:
@@ -458,33 +470,21 @@ class Metric:
 def metric(
     measure: Callable[[Any], Any],
     definition: str,
-    unit: str = "1",
-    header: str = "",
-    display: Display = PLAIN,
-    over_drives: Aggregate = mean,
-    better: Literal["lower", "higher", ""] = "lower",
-    source: str = "",
-    tables: tuple[Table, ...] = (),
+    *more: Any,
     default: Any = dataclasses.MISSING,
+    **named: Any,
 ) -> Any:
-    """Declare a metric: the field of a configuration.
+    """Declare a metric, as the field of a configuration.
 
     Args:
-        measure: Gives the value from the signals of a drive, an axis or an actuator.
-        definition: One or two sentences, for the page of metrics.
-        unit: SI, of the value in files.
-        header: In tables, without unit; a metric without header is in files only.
-        display: How tables show the value.
-        over_drives: Makes one value of those of several drives.
-        better: The better direction, where there is one.
-        source: Literature.
-        tables: The tables in which it is a column.
+        measure: The first argument of :class:`Metric`.
+        definition: The second.
+        more: The others, by place.
         default: Value in files that were written before the metric was declared.
+        named: The others, by name.
     """
-    declared = Metric(
-        "", measure, definition, unit, header, display, over_drives, better, source, tuple(tables)
-    )
-    return dataclasses.field(default=default, kw_only=True, metadata={"metric": declared})
+    one = Metric(measure, definition, *more, **named)
+    return dataclasses.field(default=default, kw_only=True, metadata={"metric": one})
 
 
 def declared(cls: type[Any]) -> list[Metric]:
