@@ -100,4 +100,7 @@ def load_benchmark(path: str | Path) -> pd.DataFrame:
     """Read ``benchmark.csv``, or the ``ladder.csv`` of an earlier version."""
     import pandas as pd
 
-    return pd.read_csv(path).rename(columns=OLD_COLUMNS)
+    # Read as text: pandas 2 does not read floats back exactly.
+    rows = pd.read_csv(path, dtype=str).rename(columns=OLD_COLUMNS)
+    types = {name: float for name in rows if name not in ("policy", "worst_axis")}
+    return rows.astype({**types, "maneuvers": int})
