@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from ..envs.storage import check_folder, check_own_json, write_bytes
 from ..evaluation.metrics import Criteria
+from ..evaluation.reporting.figures import png
 from ..evaluation.reporting.text import save_markdown, table_console
 from ..evaluation.studies.results import (
     StudyResults,
@@ -41,7 +44,7 @@ def run_and_save(
     words: Sequence[str],
     title: str,
     ratios: bool,
-    figure: Callable[[StudyResults], bytes | None],
+    figure: Callable[[StudyResults], Figure | None],
 ) -> int:
     """Drive a study, print its tables, write its files.
 
@@ -62,9 +65,9 @@ def run_and_save(
         outcome = run_study(conditions, policies, out, advance)
     results = results_of(conditions, list(policies), outcome, words)
     _write(results, out, title, ratios)
-    image = figure(results)
-    if image is not None:
-        write_bytes(out / "study.png", image)
+    drawn = figure(results)
+    if drawn is not None:
+        write_bytes(out / "study.png", png(drawn))
     console = table_console()
     print_study(console, results, title, ratios)
     console.print(
@@ -79,8 +82,8 @@ def _write(results: StudyResults, out: Path, title: str, ratios: bool) -> None:
     """What stays of a study, but its figure."""
     results.save_json(out / "study.json")
     results.save_csv(out / "study.csv")
-    left_out = [f"Left out: {line}" for line in results.told_left_out()]
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *left_out)
+    skipped = [f"Skipped: {line}" for line in results.skipped_lines()]
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *skipped)
 
 
 def results_of(
@@ -94,7 +97,7 @@ def results_of(
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),
         summaries=summarize(outcome.metrics, criteria),
-        left_out=outcome.left_out,
+        skipped=outcome.left_out,
         failures=tuple(outcome.failures),
         metrics=outcome.metrics,
         notes=outcome.notes,

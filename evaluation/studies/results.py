@@ -1,4 +1,8 @@
-"""What a study found, over the drives that every pair finished; as JSON and CSV."""
+"""Results of a study: policies under several conditions, such as machines or disturbances.
+
+Means are over the drives that every pair of policy and condition finished. They are written as ``study.json``
+and ``study.csv`` and shown as tables.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.markup import escape
 
-from ...envs.settings import configuration
+from ...envs.settings import configuration, renamed
 from ..comparison import normalized_scores
 from ..metrics import METRICS, Criteria, Metrics, over_drives
 from ..reporting.tables import SCORES, Cell, policy_table
@@ -27,10 +31,10 @@ class StudyFailure:
     """A drive without a result.
 
     Args:
-        condition: Under which it was tried.
-        policy: Whose it is; None where the maneuver itself could not be made.
-        maneuver: That was driven.
-        message: What went wrong.
+        condition: Name of the condition.
+        policy: Name of the policy; None where the maneuver itself could not be made.
+        maneuver: Name of the maneuver.
+        message: The reason.
     """
 
     condition: str
@@ -83,11 +87,11 @@ class StudyResults(Headed):
         policies: Names.
         maneuvers: In the means.
         summaries: By condition and policy.
-        left_out: By condition and policy: why it was not driven there.
         failures: Drives without a result.
         metrics: By condition, policy and maneuver.
-        notes: What policies counted, by condition, policy and maneuver, where they did.
+        notes: Counts of the policies, by condition, policy and maneuver, where they did.
         criteria: The thresholds the metrics were measured with.
+        skipped: Why a policy was not driven, by condition and policy.
     """
 
     what = "a study"
@@ -98,22 +102,26 @@ class StudyResults(Headed):
     policies: tuple[str, ...]
     maneuvers: tuple[str, ...]
     summaries: dict[str, dict[str, Summary]]
-    left_out: dict[str, dict[str, str]]
     failures: tuple[StudyFailure, ...]
     metrics: dict[str, dict[str, dict[str, Metrics]]]
     notes: dict[str, dict[str, dict[str, dict[str, str]]]]
     criteria: Criteria
+    skipped: dict[str, dict[str, str]] = renamed("skipped", "left_out")
 
     @property
     def driven(self) -> tuple[str, ...]:
-        """Policies with a result under any condition; the rest was left out or failed everywhere."""
-        found = {policy for policies in self.summaries.values() for policy in policies}
-        return tuple(policy for policy in self.policies if policy in found)
+        """Policies with a result under any condition; the others were skipped or failed everywhere."""
+        done = {policy for policies in self.summaries.values() for policy in policies}
+        return tuple(policy for policy in self.policies if policy in done)
 
-    def told_left_out(self) -> list[str]:
-        """A line for each policy and reason why it was left out, with the conditions where not under all."""
+    def across(self, policy: str) -> list[Summary | None]:
+        """Summaries of a policy under each condition."""
+        return [self.summaries.get(condition, {}).get(policy) for condition in self.conditions]
+
+    def skipped_lines(self) -> list[str]:
+        """A line for each skipped policy and its reason, with the conditions where not under all."""
         reasons: dict[tuple[str, str], list[str]] = {}
-        for condition, policies in self.left_out.items():
+        for condition, policies in self.skipped.items():
             for policy, reason in policies.items():
                 reasons.setdefault((policy, reason), []).append(condition)
         return [
@@ -122,23 +130,16 @@ class StudyResults(Headed):
         ]
 
     def save_csv(self, path: Path) -> None:
-        """Write ``study.csv``: a row a condition and policy, with the reason where it was left out."""
+        """Write ``study.csv``: a row a condition and policy, with the reason where it was skipped."""
         import pandas as pd
 
-        rows = [
-            {
-                "condition": condition,
-                "policy": policy,
-                **(
-                    self.summaries[condition][policy].row
-                    if policy in self.summaries.get(condition, {})
-                    else {}
-                ),
-                "left_out": self.left_out.get(condition, {}).get(policy),
-            }
-            for condition in self.conditions
-            for policy in self.policies
-        ]
+        rows = []
+        for condition in self.conditions:
+            summaries, skipped = self.summaries.get(condition, {}), self.skipped.get(condition, {})
+            for policy in self.policies:
+                numbers = summaries[policy].row if policy in summaries else {}
+                reason = skipped.get(policy)
+                rows.append({"condition": condition, "policy": policy, **numbers, "skipped": reason})
         save_frame(pd.DataFrame(rows), path)
 
     @classmethod
@@ -197,9 +198,6 @@ def summarize(
     return summaries
 
 
-# The tables of a study.
-
-
 def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
     """J of every policy that was driven under every condition.
 
@@ -210,20 +208,19 @@ def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
     """
     rows = []
     for policy in results.driven:
-        cells = [_cell(results, condition, policy, ratios) for condition in results.conditions]
+        cells = []
+        for i, (condition, summary) in enumerate(
+            zip(results.conditions, results.across(policy), strict=True)
+        ):
+            if summary is None:
+                cells.append("skipped" if policy in results.skipped.get(condition, {}) else NOTHING)
+            elif not ratios or i == 0 or summary.ratio is None:
+                cells.append(number(summary.cue_error))
+            else:
+                cells.append(f"{number(summary.cue_error)} (×{summary.ratio:.2f})")
         rows.append((policy, *cells))
     about = f"{title}: J, mean over {how_many(len(results.maneuvers), 'drive')}"
     return TextTable(about, ("policy", *results.conditions), tuple(rows))
-
-
-def _cell(results: StudyResults, condition: str, policy: str, ratios: bool) -> str:
-    found = results.summaries.get(condition, {}).get(policy)
-    if found is None:
-        return "left out" if policy in results.left_out.get(condition, {}) else NOTHING
-    first = condition == next(iter(results.conditions))
-    if not ratios or first or found.ratio is None:
-        return number(found.cue_error)
-    return f"{number(found.cue_error)} (×{found.ratio:.2f})"
 
 
 def score_tables(results: StudyResults) -> list[TextTable]:
@@ -235,15 +232,15 @@ def score_tables(results: StudyResults) -> list[TextTable]:
     for name, title in SCORES.items():
         rows = []
         for policy in results.driven:
-            summaries = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
-            rows.append((policy, *(fraction(None if s is None else s.row[name]) for s in summaries)))
+            scores = [None if s is None else s.row[name] for s in results.across(policy)]
+            rows.append((policy, *map(fraction, scores)))
         if any(set(row[1:]) != {NOTHING} for row in rows):
             tables.append(TextTable(title.capitalize(), ("policy", *results.conditions), tuple(rows)))
     return tables
 
 
 def condition_table(results: StudyResults, condition: str) -> TextTable:
-    """Every policy under one condition, best first; those left out are missing."""
+    """Every policy under one condition, best first; skipped ones are missing."""
     import pandas as pd
 
     summaries = results.summaries.get(condition, {})
@@ -258,20 +255,20 @@ def condition_table(results: StudyResults, condition: str) -> TextTable:
 
 
 def print_study(console: Console, results: StudyResults, title: str, ratios: bool) -> None:
-    """Show a table a condition, the matrices of J and scores, and what was counted, left out or failed."""
+    """Show a table a condition, the matrices of J and scores, counts, skipped policies and failures."""
     for condition in results.conditions:
         print_table(console, condition_table(results, condition))
     for table in (matrix_table(results, title, ratios), *score_tables(results)):
         print_table(console, table)
     counted = [
-        (policy, f"{condition} {maneuver}", found)
+        (policy, f"{condition} {maneuver}", counts)
         for condition, policies in results.notes.items()
         for policy, drives in policies.items()
-        for maneuver, found in drives.items()
+        for maneuver, counts in drives.items()
     ]
     print_troubles(console, counted)
-    for line in results.told_left_out():
-        console.print(f"[bold]left out[/bold] {escape(line)}", highlight=False)
+    for line in results.skipped_lines():
+        console.print(f"[bold]skipped[/bold] {escape(line)}", highlight=False)
     for failure in results.failures:
         who = ", ".join(part for part in (failure.condition, failure.policy, failure.maneuver) if part)
         console.print(

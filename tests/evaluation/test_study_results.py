@@ -6,10 +6,12 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from motion_cueing.evaluation.benchmark import OLD_COLUMNS
 from motion_cueing.evaluation.metrics import METRICS, measure
+from motion_cueing.evaluation.studies.figures import heat_figure, lines_figure
 from motion_cueing.evaluation.studies.results import StudyResults, condition_table, summarize
 
 from .synthetic import drive
@@ -50,3 +52,25 @@ def test_drives_combine_as_each_metric_declares():
         summaries["slow"]["mine"].cue_error / fast.cue_error
     )
     assert list(summaries["slow"]) == ["mine"]
+
+
+def test_lines_show_the_numbers_of_every_policy_and_condition():
+    results = StudyResults.load_json(BEFORE)
+    names = ("cue_error", "normalized_score", "perceived_cue_error")
+    panels = lines_figure(results).axes
+    for axes, name, least in zip(panels, names, (0.01, -1.0, 0.01), strict=False):
+        lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+        for policy in results.policies:
+            values = [results.summaries[condition][policy].row[name] for condition in results.conditions]
+            np.testing.assert_array_equal(lines[policy], np.maximum(values, least))
+
+
+def test_cells_show_j_and_its_ratio():
+    results = StudyResults.load_json(BEFORE)
+    axes = heat_figure(results).axes[0]
+    (image,) = axes.images
+    ratios = [[results.summaries[c][p].ratio for c in results.conditions] for p in results.policies]
+    np.testing.assert_array_equal(image.get_array(), ratios)
+    texts = [text.get_text() for text in axes.texts]
+    assert texts[:2] == ["1.71\nlimits 0.0%", "1.71\n×1.00, limits 0.0%"]
+    assert len(texts) == np.size(ratios)
