@@ -362,9 +362,9 @@ class DriveSignals:
     def actuators(self) -> dict[str, ActuatorSignals]:
         """Signals by :data:`~.trajectory.ACTUATORS`."""
         drive = self.trajectory
-        low, high = drive.limits.position_min, drive.limits.position_max
+        low, high, positions = drive.limits.position_min, drive.limits.position_max, drive.positions
         return {
-            name: ActuatorSignals(drive.positions[:, i], low[i], high[i], drive.limits_active[:, i] != 0)
+            name: ActuatorSignals(positions[:, i], low[i], high[i], drive.limits_active[:, i] != 0)
             for i, name in enumerate(ACTUATORS)
         }
 

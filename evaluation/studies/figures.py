@@ -61,9 +61,7 @@ def _errors(axes: Axes, results: StudyResults, perceived: bool) -> None:
     axes.set_ylim(bottom=max(axes.get_ylim()[0], 0.8 * FLOOR))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_title(
-        "Perceived J" if perceived else "J at the cab (logarithmic; below 1 within the indifference zone)"
-    )
+    axes.set_title("Perceived J" if perceived else "J at the cab; below 1 within the indifference zone")
 
 
 def _scores(axes: Axes, results: StudyResults, perceived: bool) -> None:
