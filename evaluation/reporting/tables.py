@@ -24,6 +24,10 @@ SCORES: Final = {
 """Columns of the normalized scores and their headers; shown where any policy has a score."""
 
 
+Cell = Callable[[Mapping[str, Any]], str]
+"""The text of a cell from the row of a frame."""
+
+
 def policy_table(title: str, frame: pd.DataFrame, table: Table, more: Mapping[str, Cell] = {}) -> TextTable:
     """A table with a row a policy; the one with the lowest J is stressed.
 
@@ -46,10 +50,6 @@ def policy_table(title: str, frame: pd.DataFrame, table: Table, more: Mapping[st
     rows = [tuple(cell(row) for cell in columns.values()) for row in records]
     best = (int(frame["cue_error"].argmin()),) if rows else ()
     return TextTable(title, tuple(columns), tuple(rows), best)
-
-
-Cell = Callable[[Mapping[str, Any]], str]
-"""The text of a cell from the row of a frame."""
 
 
 def _metric_cell(name: str) -> Cell:
