@@ -39,6 +39,7 @@ def policy_table(title: str, frame: pd.DataFrame, table: Table, more: Mapping[st
     """
     columns: dict[str, Cell] = {"policy": lambda row: row["policy"]}
     metrics = {one.title: _metric_cell(name) for name, one in METRICS.items() if table in one.tables}
+    # J and the perceived J stand first, their scores beside them.
     for header in list(metrics)[:2]:
         columns[header] = metrics.pop(header)
     if has_scores(frame):
