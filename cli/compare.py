@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.errors import ConfigurationError
-from ..evaluation.benchmark import ALL_RUNGS
+from ..evaluation.benchmark import BENCHMARK
 from ..evaluation.reporting.text import words_of
 from ..evaluation.selection import ALL, find_car, find_maneuvers, find_platform, find_policies
 from .studies import prepare, run_and_save
@@ -31,8 +31,8 @@ class CompareCommand:
 
     platforms: Names = (ALL,)
     """Motion bases, by name or YAML file; `all` for every whole one."""
-    policies: Names = (ALL_RUNGS,)
-    """Policies, by name or file; `ladder` for every controller."""
+    policies: Names = (BENCHMARK,)
+    """Policies, by name or file; `benchmark` for every controller."""
     maneuvers: Names = (ALL,)
     """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
     ablations: Annotated[bool, FlagCreatePairsOff] = False

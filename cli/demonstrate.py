@@ -12,6 +12,7 @@ from tyro.conf import arg
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError
+from ..envs.provenance import command_line, commit, hardware, now, versions
 from ..envs.settings import to_dict
 from ..envs.storage import check_folder
 from ..evaluation.demonstrations import Demonstrator, demonstrate
@@ -21,7 +22,6 @@ from ..evaluation.rollout import notes_of
 from ..evaluation.selection import find_car, find_maneuvers, find_platform
 from ..evaluation.suite import CueSource, suite_progress
 from ..train.algorithms.dagger.demonstrations import INDEX, DriveEntry, Index, is_kept, load_index, save_drive
-from ..train.provenance import command_line, commit, hardware, now, versions
 
 _SUCCESS: Final = 0
 

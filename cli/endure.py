@@ -15,7 +15,6 @@ from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.errors import ConfigurationError
 from ..envs.storage import check_folder, check_own_json
-from ..evaluation.provenance import head_of
 from ..evaluation.reporting.text import how_many, print_table, save_markdown, table_console, words_of
 from ..evaluation.selection import find_platform, find_policies
 
@@ -146,7 +145,7 @@ def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceRes
 
     driven = {name: one for name, one in found.policies.items() if one.drives}
     return EnduranceResults(
-        **head_of(EnduranceResults, words_of("endure", command)),
+        **EnduranceResults.head(words_of("endure", command)),
         platform=asked.platform.name,
         endurance=asked.endurance,
         finished=found.finished,

@@ -11,15 +11,13 @@ from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, MotionCueingError
-from ..envs.settings import to_dict
 from ..envs.storage import check_folder, check_own_json, write_bytes
-from ..evaluation.benchmark import ALL_RUNGS, ladder_table, save_ladder
-from ..evaluation.provenance import provenance
-from ..evaluation.reporting.figures import ladder_figure, maneuver_figure
+from ..evaluation.benchmark import BENCHMARK, benchmark_table, save_benchmark
+from ..evaluation.reporting.figures import benchmark_figure, maneuver_figure, png
 from ..evaluation.reporting.report import save_report
 from ..evaluation.reporting.tables import print_results
 from ..evaluation.reporting.text import file_names, print_table, table_console, words_of
-from ..evaluation.results import Results
+from ..evaluation.results import Provenance, Results
 from ..evaluation.selection import ALL, find_car, find_maneuvers, find_platform, find_policies
 from ..evaluation.suite import (
     DRIVEN,
@@ -47,13 +45,13 @@ Folder = Annotated[Path, arg(metavar="DIR")]
 class EvaluateCommand:
     """Drive maneuvers with policies, and say which policy is better, by how much, and why.
 
-    Writes results.json, results.csv, report.html, the ladder over all maneuvers, one figure a maneuver, and
-    every trajectory.
+    Writes results.json, results.csv, report.html, the benchmark over all maneuvers, one figure a maneuver,
+    and every trajectory.
     `motion-cueing list` shows all names.
     """
 
     policy: Names = ()
-    """Policies, by name or file; default: the ones meant for comparison; `ladder` for all controllers."""
+    """Policies, by name or file; default: the ones meant for comparison; `benchmark` for all controllers."""
     maneuver: Names = (ALL,)
     """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
     replay: Files = ()
@@ -79,7 +77,7 @@ class Plan:
         car: The car.
         out: Folder of the output.
         arguments: The command line that asks for it.
-        left_out: Policies of the ladder that cannot be driven here, and why.
+        left_out: Policies of the benchmark that cannot be driven here, and why.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -108,7 +106,7 @@ class _Output:
         for policy, drive in drives.items():
             name = f"{self.maneuvers[maneuver]}--{self.policies[policy]}.npz"
             drive.save(self.folder / "trajectories" / name)
-        self.figures[maneuver] = maneuver_figure(drives, list(self.policies))
+        self.figures[maneuver] = png(maneuver_figure(drives, list(self.policies)))
         write_bytes(self.folder / f"{self.maneuvers[maneuver]}.png", self.figures[maneuver])
 
 
@@ -125,8 +123,8 @@ def run(command: EvaluateCommand) -> int:
     save(results, figures, plan.out)
     console = table_console()
     print_results(console, results)
-    if ALL_RUNGS in command.policy and results.standings:
-        print_table(console, ladder_table(results))
+    if BENCHMARK in command.policy and results.scores:
+        print_table(console, benchmark_table(results))
     console.print(
         f"Everything is in {plan.out}; open {plan.out / 'report.html'}", highlight=False, markup=False
     )
@@ -181,7 +179,7 @@ def _line_up(
         try:
             drives[label] = _drive_with(name, platform, car)
         except MotionCueingError as error:
-            if ALL_RUNGS not in command.policy or name in command.policy:
+            if BENCHMARK not in command.policy or name in command.policy:
                 raise
             left_out[label] = str(error)
     return drives, left_out
@@ -202,26 +200,20 @@ def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
 
 def collect(plan: Plan, outcome: Outcome) -> Results:
     """The results of an outcome, with what made them."""
-    origin = provenance(
-        plan.arguments,
-        (plan.platform.name, to_dict(plan.platform)),
-        (plan.car.name, to_dict(plan.car)),
-        outcome.metadata,
-    )
-    return Results.of(
-        outcome.maneuvers, outcome.failures, origin, left_out=plan.left_out, notes=outcome.notes
-    )
+    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata)
+    return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.left_out, notes=outcome.notes)
 
 
 def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
-    """Write results.json, results.csv, the ladder and report.html into a folder."""
+    """Write results.json, results.csv, the benchmark and report.html into a folder."""
     results.save_json(folder / "results.json")
     results.save_csv(folder / "results.csv")
-    ladder = ladder_figure(results)
-    if ladder is not None:
-        save_ladder(results, folder)
-        write_bytes(folder / "ladder.png", ladder)
-    save_report(results, figures, folder / "report.html", ladder)
+    figure = benchmark_figure(results)
+    image = None if figure is None else png(figure)
+    if image is not None:
+        save_benchmark(results, folder)
+        write_bytes(folder / "benchmark.png", image)
+    save_report(results, figures, folder / "report.html", image)
 
 
 def _drive_with(name: str, platform: Platform, car: Car) -> Drive:

@@ -12,7 +12,7 @@ from tyro.conf import FlagCreatePairsOff, arg
 
 from ..envs.errors import ConfigurationError, MotionCueingError, look_up
 from ..envs.storage import check_folder, check_own_json, write_bytes
-from ..evaluation.benchmark import ALL_RUNGS
+from ..evaluation.benchmark import BENCHMARK
 from ..evaluation.frequency_response.reporting import response_table, save_csv, save_json
 from ..evaluation.frequency_response.response import OMCT_FREQUENCIES, FrequencyTest
 from ..evaluation.metrics import CUE_AXES
@@ -38,7 +38,7 @@ class FrequencyResponseCommand:
     """
 
     policy: Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
-    """Policies, by name or file; `ladder` for all controllers that can be tested."""
+    """Policies, by name or file; `benchmark` for all controllers that can be tested."""
     platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
     """Motion base, by name or YAML file."""
     out: Annotated[Path, arg(metavar="DIR")] = Path("frequency-response")
@@ -61,7 +61,7 @@ class Measured:
 
     Args:
         responses: One a policy.
-        left_out: Policies of the ladder that cannot be tested here, and why.
+        left_out: Policies of the benchmark that cannot be tested here, and why.
         failed: Policies whose test came to no end, and why.
     """
 
@@ -130,7 +130,7 @@ def measure_all(command: FrequencyResponseCommand) -> Measured:
 def _line_up(
     command: FrequencyResponseCommand, platform: Platform
 ) -> tuple[dict[str, AnyPolicy], dict[str, str]]:
-    """Policies by label, and the reasons of those of the ladder that are left out.
+    """Policies by label, and the reasons of those of the benchmark that are left out.
 
     Raises:
         MotionCueingError: a policy that is asked for by its name cannot be made or tested.
@@ -141,7 +141,7 @@ def _line_up(
         try:
             policies[label] = _testable(name, platform)
         except MotionCueingError as error:
-            if ALL_RUNGS not in command.policy or name in command.policy:
+            if BENCHMARK not in command.policy or name in command.policy:
                 raise
             left_out[label] = str(error)
     return policies, left_out

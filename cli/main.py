@@ -222,7 +222,7 @@ def _dispatch(arguments: list[str]) -> int:
         print(overview())
         return SUCCESS if arguments else BAD_ARGUMENTS
     if arguments[0] == "--version":
-        from ..evaluation.provenance import package_version
+        from ..envs.provenance import package_version
 
         print(f"{PROGRAM} {package_version()}")
         return SUCCESS

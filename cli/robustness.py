@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import FlagCreatePairsOff, arg
 
-from ..evaluation.benchmark import ALL_RUNGS, ladder_names
+from ..evaluation.benchmark import BENCHMARK, benchmark_policies
 from ..evaluation.reporting.text import words_of
 from ..evaluation.selection import find_car, find_maneuvers, find_platform, find_policies
 from .studies import prepare, run_and_save
@@ -32,8 +32,8 @@ class RobustnessCommand:
     done are kept in the output folder and not driven again.
     """
 
-    policies: Names = (ALL_RUNGS,)
-    """Policies, by name or file; `ladder` for every controller that is not told the drive beforehand."""
+    policies: Names = (BENCHMARK,)
+    """Policies, by name or file; `benchmark` for every controller that is not told the drive beforehand."""
     maneuvers: Names = ()
     """Maneuvers and recordings, by name or cue CSV file; default: the standard maneuvers."""
     platform: Name = "paper"
@@ -95,13 +95,13 @@ def make_study(command: RobustnessCommand) -> Study:
     def maneuvers(driven: Car) -> Mapping[str, CueSource]:
         return find_maneuvers(names, driven)
 
-    rungs = ladder_names(policy_names()) if ALL_RUNGS in command.policies else []
+    compared = benchmark_policies(policy_names()) if BENCHMARK in command.policies else []
     return Study(
         platform=find_platform(command.platform),
         car=find_car(command.car),
         other=find_car(command.other_car),
         maneuvers=maneuvers,
-        causal=frozenset(rungs) - set(command.policies),
+        causal=frozenset(compared) - set(command.policies),
         disturbances=Disturbances(
             lag=command.lag,
             dead_time=command.dead_time,

@@ -16,11 +16,11 @@ from tyro.conf import FlagCreatePairsOff, Positional, arg
 from ..baselines.tuning.search import Status
 from ..baselines.washout.families import FAMILIES, AnyWashout, algorithm_of, load_of
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.provenance import command_line, commit, hardware, now, versions
 from ..envs.settings import to_dict
 from ..envs.storage import check_file, write_text
 from ..evaluation.selection import find_car, find_maneuvers, find_platform
-from ..train.provenance import command_line, commit, hardware, now, versions
 from ..train.training import Interrupt
 
 if TYPE_CHECKING:

@@ -29,14 +29,15 @@ Vector3 = tuple[float, float, float]
 T = TypeVar("T")
 
 
-def renamed(name: str, *before: str) -> Any:
+def renamed(name: str, *before: str, **more: Any) -> Any:
     """Metadata of a field that had other names in files of earlier versions; those are still read.
 
     Args:
         name: Its name.
         before: Its earlier names.
+        more: Its ``default`` or ``default_factory``, where it has one.
     """
-    return Field(validation_alias=AliasChoices(name, *before))
+    return Field(validation_alias=AliasChoices(name, *before), **more)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))

@@ -1,8 +1,9 @@
-"""Policies driven and scored: which is better, by how much, and why."""
+"""Evaluation: policies drive maneuvers and are compared: which is better, by how much, and why."""
 
 from .comparison import judge
 from .metrics import Criteria, Metrics, measure
+from .results import Results
 from .rollout import rollout
 from .trajectory import LimitTable, Trajectory
 
-__all__ = ["Criteria", "LimitTable", "Metrics", "Trajectory", "judge", "measure", "rollout"]
+__all__ = ["Criteria", "LimitTable", "Metrics", "Results", "Trajectory", "judge", "measure", "rollout"]

@@ -1,18 +1,25 @@
-"""The share of the possible improvement that a policy reaches: 0 at the tuned washout, 1 at the optimum."""
+"""Comparison of policies: which is better, by how much, and why.
+
+Normalized score: 0 is the reference washout, 1 is the optimum, as in papers on reinforcement learning.
+
+J is a sum over axes, and each axis has a sum over causes: a false cue, a missing cue, or a cue of the wrong
+size or time ("shape"). The difference of two J is therefore a sum over axis and cause. Its largest terms are
+the reason why one policy is better than another.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from itertools import product
 from typing import Final, Literal
 
-from ..envs.settings import configuration
-from .metrics import CUE_AXES, Metrics, References
+from ..envs.settings import configuration, renamed
+from .metrics import CUE_AXES, Metrics, References, mean
 
 
 @configuration
-class Share:
-    """Share of the gap between the washout at its best and the optimum; None where there is no such gap.
+class NormalizedScore:
+    """The normalized score of one policy; None where a reference is missing or no better than the baseline.
 
     Args:
         cue_error: (J of the baseline - J) / (J of the baseline - J of the optimum).
@@ -23,57 +30,56 @@ class Share:
     perceived_cue_error: float | None = None
 
 
-def gap_share(value: float, baseline: float | None, ceiling: float | None) -> float | None:
-    """How far a value is on its way from the baseline's down to the ceiling's.
+def normalized_score(value: float, baseline: float | None, optimum: float | None) -> float | None:
+    """The place of a J between those of the baseline (0) and of the optimum (1).
 
     Args:
         value: J of the policy.
-        baseline: J of the policy whose share is 0, if it was driven.
-        ceiling: J of the policy whose share is 1, if it was driven.
+        baseline: J of the policy whose score is 0, if it was driven.
+        optimum: J of the policy whose score is 1, if it was driven.
 
     Returns:
-        None where one of the two is missing, or where there is no gap because the baseline is not worse.
+        None where one of the two is missing, or where the baseline is not the worse of the two.
     """
-    if baseline is None or ceiling is None or not baseline > ceiling:
+    if baseline is None or optimum is None or not baseline > optimum:
         return None
-    return (baseline - value) / (baseline - ceiling)
+    return (baseline - value) / (baseline - optimum)
 
 
-def shares(
+def normalized_scores(
     cue_error: Mapping[str, float], perceived: Mapping[str, float], references: References
-) -> dict[str, Share]:
-    """The share of each policy.
+) -> dict[str, NormalizedScore]:
+    """The score of each policy.
 
     Args:
         cue_error: J by policy, of one drive or a mean over the same drives.
         perceived: Perceived J of the same policies.
-        references: Which policies are 0 and 1.
+        references: The policies with scores 0 and 1.
     """
     ends = (cue_error.get(references.baseline), cue_error.get(references.optimum))
     perceived_ends = (perceived.get(references.baseline), perceived.get(references.perceived_optimum))
     return {
-        name: Share(gap_share(cue_error[name], *ends), gap_share(perceived[name], *perceived_ends))
+        name: NormalizedScore(
+            normalized_score(cue_error[name], *ends), normalized_score(perceived[name], *perceived_ends)
+        )
         for name in cue_error
     }
-
-
-# Which policy is better, by how much, and why.
-#
-# J is a sum over axes, and each axis's part a sum over what the simulator did wrong at the time: a
-# false cue, a
-# missing cue, or a cue there but of the wrong size or time ("shape"). The difference of two J is therefore a
-# sum over axis and cause, and the largest terms are the reason.
 
 
 Cause = Literal["false", "missing", "shape"]
 CAUSES: Final[tuple[Cause, ...]] = ("false", "missing", "shape")
 STILL: Final = "no-motion"
-"""The policy that does nothing, which every other must beat."""
+"""The policy that does nothing. Every other one must beat it."""
 
-_WORDS: Final[Mapping[Cause, tuple[str, str]]] = {
-    "false": ("fewer or smaller false cues", "false cues"),
-    "missing": ("fewer missing cues", "missing cues"),
-    "shape": ("cues nearer in size and time", "cues of the wrong size or time"),
+_GAINS: Final[Mapping[Cause, str]] = {
+    "false": "fewer or smaller false cues",
+    "missing": "fewer missing cues",
+    "shape": "cues nearer in size and time",
+}
+_LOSSES: Final[Mapping[Cause, str]] = {
+    "false": "false cues",
+    "missing": "missing cues",
+    "shape": "cues of the wrong size or time",
 }
 
 Terms = Mapping[tuple[str, Cause], float]
@@ -90,9 +96,9 @@ class Advantage:
         margin: By how much J is lower, as a share of that J.
         axis: The axis that contributes most to the difference.
         axis_share: Its part of the difference; above 1 where other axes are worse.
-        cause: What contributes most on this axis.
+        cause: The cause that contributes most on this axis.
         worse_axis: The axis on which it loses most, if it loses on any.
-        worse_cause: What it does wrong there.
+        worse_cause: The cause of the loss there.
     """
 
     over: str
@@ -104,6 +110,20 @@ class Advantage:
     worse_axis: str | None
     worse_cause: Cause | None
 
+    @property
+    def sentence(self) -> str:
+        """The advantage in words; "it" is the better policy."""
+        if self.axis is None or self.axis_share is None or self.cause is None:
+            return f"{self.over} has the same J ({self.cue_error:.3g})."
+        gained = self.axis_share * self.margin * self.cue_error
+        text = (
+            f"Its J is {self.margin:.0%} lower than that of {self.over} ({self.cue_error:.3g}). "
+            f"It gains most on {self.axis} ({gained:.3g}): {_GAINS[self.cause]}."
+        )
+        if self.worse_axis is not None and self.worse_cause is not None:
+            text += f" It is worse on {self.worse_axis}: {_LOSSES[self.worse_cause]}."
+        return text
+
 
 @configuration
 class Verdict:
@@ -114,7 +134,7 @@ class Verdict:
         ranking: Policies, best first, by J.
         cue_error: J of the best.
         perceived_best: Best by the perceived J.
-        advantages: Of the best over the second and, if another one, over no motion.
+        advantages: Of the best over the second and, if that is another one, over no motion.
     """
 
     maneuver: str
@@ -131,26 +151,26 @@ class Verdict:
     @property
     def sentences(self) -> list[str]:
         """The verdict in words."""
-        lines = [f"{self.best} is best with J = {self.cue_error:.3g}."]
-        lines += [_explain(self.best, advantage) for advantage in self.advantages]
+        lines = [f"{self.best} is best: J = {self.cue_error:.3g}."]
+        lines += [advantage.sentence for advantage in self.advantages]
         if self.perceived_best != self.best:
             lines.append(f"By the perceived J, {self.perceived_best} is best.")
         return lines
 
 
 @configuration
-class Standing:
-    """One policy over the suite.
+class SuiteScore:
+    """One policy over the suite: the maneuvers that every policy finished.
 
     Args:
         policy: Name.
-        maneuvers: Number of maneuvers in the means: those that every policy finished.
+        maneuvers: Number of maneuvers in the means.
         cue_error: Mean J over them.
         perceived_cue_error: Mean perceived J.
         wins: Maneuvers on which its J is lowest.
-        worst_maneuver: Where its J is highest.
-        share: Of the gap between the references' means; None where one of them is missing.
-        perceived_share: The same of the perceived J.
+        worst_maneuver: The one with its highest J.
+        normalized_score: Of the mean J; None where a reference is missing.
+        perceived_normalized_score: The same of the perceived J.
     """
 
     policy: str
@@ -159,8 +179,10 @@ class Standing:
     perceived_cue_error: float
     wins: int
     worst_maneuver: str
-    share: float | None = None
-    perceived_share: float | None = None
+    normalized_score: float | None = renamed("normalized_score", "share", default=None)
+    perceived_normalized_score: float | None = renamed(
+        "perceived_normalized_score", "perceived_share", default=None
+    )
 
 
 def terms(metrics: Metrics) -> Terms:
@@ -182,22 +204,22 @@ def advantage(of: Terms, name: str, over: Terms) -> Advantage:
         return Advantage(name, theirs, 0.0, None, None, None, None, None)
     best, worst = max(by_axis, key=by_axis.__getitem__), min(by_axis, key=by_axis.__getitem__)
     loses = by_axis[worst] < 0.0
+
+    def largest(axis: str, sign: float) -> Cause:
+        """The cause with the largest gain (sign 1) or loss (sign -1) on an axis."""
+        signed: dict[Cause, float] = {cause: sign * gain[axis, cause] for cause in CAUSES}
+        return max(signed, key=signed.__getitem__)
+
     return Advantage(
         over=name,
         cue_error=theirs,
         margin=total / theirs,
         axis=best,
         axis_share=by_axis[best] / total,
-        cause=_extreme(gain, best, 1.0),
+        cause=largest(best, 1.0),
         worse_axis=worst if loses else None,
-        worse_cause=_extreme(gain, worst, -1.0) if loses else None,
+        worse_cause=largest(worst, -1.0) if loses else None,
     )
-
-
-def _extreme(gain: Terms, axis: str, sign: float) -> Cause:
-    """The cause with the largest gain (sign 1) or loss (sign -1) on an axis."""
-    signed: dict[Cause, float] = {cause: sign * gain[axis, cause] for cause in CAUSES}
-    return max(signed, key=signed.__getitem__)
 
 
 def judge(maneuver: str, policies: Mapping[str, Metrics]) -> Verdict:
@@ -208,14 +230,14 @@ def judge(maneuver: str, policies: Mapping[str, Metrics]) -> Verdict:
 
 def judge_suite(
     maneuvers: Mapping[str, Mapping[str, Metrics]], references: References | None = None
-) -> tuple[Verdict | None, list[Standing]]:
-    """The verdict on the mean J and each policy's standing, best first.
+) -> tuple[Verdict | None, list[SuiteScore]]:
+    """The verdict on the mean J and each policy's score, best first.
 
     Only maneuvers that every policy finished count, so that all means are over the same drives.
 
     Args:
         maneuvers: Metrics by maneuver and policy.
-        references: Policies between which the share of the gap is measured.
+        references: Policies between which the normalized score is measured.
 
     Returns:
         None and an empty list where there is no such maneuver.
@@ -223,16 +245,25 @@ def judge_suite(
     common = common_drives(maneuvers)
     if not common:
         return None, []
-    names = sorted(next(iter(common.values())))
-    perceived = {
-        name: _mean(drives[name].perceived_cue_error for drives in common.values()) for name in names
-    }
-    verdict = _judge("all", {name: _mean_terms(common, name) for name in names}, perceived)
-    winners = [judge(maneuver, drives).best for maneuver, drives in common.items()]
-    errors = {name: _mean(drives[name].cue_error for drives in common.values()) for name in names}
-    gap = shares(errors, perceived, references or References())
-    standings = [_standing(name, common, winners.count(name), gap[name]) for name in verdict.ranking]
-    return verdict, standings
+    drives = {name: [policies[name] for policies in common.values()] for name in next(iter(common.values()))}
+    errors = {name: mean([m.cue_error for m in each]) for name, each in drives.items()}
+    perceived = {name: mean([m.perceived_cue_error for m in each]) for name, each in drives.items()}
+    verdict = _judge("all", {name: _mean_terms(each) for name, each in drives.items()}, perceived)
+    winners = [judge(maneuver, policies).best for maneuver, policies in common.items()]
+    scores = normalized_scores(errors, perceived, references or References())
+    return verdict, [
+        SuiteScore(
+            policy=name,
+            maneuvers=len(common),
+            cue_error=errors[name],
+            perceived_cue_error=perceived[name],
+            wins=winners.count(name),
+            worst_maneuver=max(common, key=lambda maneuver: common[maneuver][name].cue_error),
+            normalized_score=scores[name].cue_error,
+            perceived_normalized_score=scores[name].perceived_cue_error,
+        )
+        for name in verdict.ranking
+    ]
 
 
 def common_drives(maneuvers: Mapping[str, Mapping[str, Metrics]]) -> dict[str, Mapping[str, Metrics]]:
@@ -255,37 +286,6 @@ def _judge(maneuver: str, policies: Mapping[str, Terms], perceived: Mapping[str,
     )
 
 
-def _standing(name: str, drives: Mapping[str, Mapping[str, Metrics]], wins: int, share: Share) -> Standing:
-    return Standing(
-        policy=name,
-        maneuvers=len(drives),
-        cue_error=_mean(policies[name].cue_error for policies in drives.values()),
-        perceived_cue_error=_mean(policies[name].perceived_cue_error for policies in drives.values()),
-        wins=wins,
-        worst_maneuver=max(drives, key=lambda maneuver: drives[maneuver][name].cue_error),
-        share=share.cue_error,
-        perceived_share=share.perceived_cue_error,
-    )
-
-
-def _mean_terms(drives: Mapping[str, Mapping[str, Metrics]], name: str) -> Terms:
-    every = [terms(policies[name]) for policies in drives.values()]
-    return {key: _mean(parts[key] for parts in every) for key in product(CUE_AXES, CAUSES)}
-
-
-def _mean(values: Iterable[float]) -> float:
-    listed = list(values)
-    return sum(listed) / len(listed)
-
-
-def _explain(best: str, why: Advantage) -> str:
-    if why.axis is None or why.axis_share is None or why.cause is None:
-        return f"{why.over} is level with it (J = {why.cue_error:.3g})."
-    gained = why.axis_share * why.margin * why.cue_error
-    text = (
-        f"Its J is {why.margin:.0%} below that of {why.over} ({why.cue_error:.3g}), mainly by "
-        f"{gained:.3g} less on {why.axis}: {_WORDS[why.cause][0]}."
-    )
-    if why.worse_axis is not None and why.worse_cause is not None:
-        text += f" {best} is the worse of the two on {why.worse_axis}: {_WORDS[why.worse_cause][1]}."
-    return text
+def _mean_terms(drives: list[Metrics]) -> Terms:
+    every = [terms(metrics) for metrics in drives]
+    return {key: mean([parts[key] for parts in every]) for key in product(CUE_AXES, CAUSES)}

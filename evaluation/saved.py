@@ -1,49 +1,66 @@
-"""Results of any kind as JSON: written whole or not at all, read only if they are of the version known."""
+"""Results of any kind as JSON: written whole or not at all, and read from this and from earlier versions."""
 
 from __future__ import annotations
 
 import json
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 from typing_extensions import Self
 
+from ..envs import provenance
 from ..envs.errors import DataError
 from ..envs.settings import configuration, from_dict, to_dict
 from ..envs.storage import write_text
 
-T = TypeVar("T")
-
 
 class Saved:
-    """A configuration that is kept in a file, and has a field ``schema``.
+    """A configuration with a file of its own. Its field ``schema`` is the version of the file.
 
     Attributes:
-        what: It is called in messages.
-        version: Of its file; a reader refuses others.
+        what: Its name in messages.
+        version: Version that is written.
+        oldest: Oldest version that is read.
     """
 
     what: ClassVar[str]
     version: ClassVar[int]
+    oldest: ClassVar[int | None] = None
 
     def save_json(self, path: str | Path) -> None:
-        """Write it, whole or not at all."""
-        save_json(self, path)
+        """Write the file, whole or not at all."""
+        write_text(path, json.dumps(to_dict(self), indent=1, allow_nan=False) + "\n")
 
     @classmethod
     def load_json(cls, path: str | Path) -> Self:
-        """Read what :meth:`save_json` wrote.
+        """Read a file of this version, or of an earlier one that can be brought up to it.
 
         Raises:
             DataError: the file is missing, broken, or of another version.
             ConfigurationError: a field is missing, unknown or wrong.
         """
-        return load_json(cls, path, cls.what, cls.version)
+        try:
+            values = json.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise DataError(f"{path}: cannot be read as {cls.what} ({error})") from None
+        schema = values.get("schema") if isinstance(values, dict) else None
+        oldest = cls.version if cls.oldest is None else cls.oldest
+        if not isinstance(schema, int) or not oldest <= schema <= cls.version:
+            known = f"{cls.version}" if oldest == cls.version else f"{oldest} to {cls.version}"
+            raise DataError(f"{path}: {cls.what} of version {schema}, this package reads {known}")
+        return from_dict(cls, cls.upgrade(values) | {"schema": cls.version}, str(path))
+
+    @classmethod
+    def upgrade(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """The content of a file, with the structure of the current version."""
+        return values
 
 
 @configuration
 class Headed(Saved):
-    """Results that begin with what made them; see ``provenance.head_of``.
+    """Results that begin with their origin.
 
     Args:
         schema: Version of the file.
@@ -57,35 +74,16 @@ class Headed(Saved):
     created: str
     versions: dict[str, str]
 
+    @classmethod
+    def head(cls, words: Sequence[str]) -> dict[str, Any]:
+        """The fields above, for results made now.
 
-def save_json(results: Any, path: str | Path) -> None:
-    """Write a configuration, whose field ``schema`` is its version.
-
-    Args:
-        results: The configuration.
-        path: The file.
-    """
-    write_text(path, json.dumps(to_dict(results), indent=1, allow_nan=False) + "\n")
-
-
-def load_json(cls: type[T], path: str | Path, what: str, schema: int) -> T:
-    """Read what :func:`save_json` wrote.
-
-    Args:
-        cls: The configuration.
-        path: The file.
-        what: It is called in messages.
-        schema: The version known.
-
-    Raises:
-        DataError: the file is missing, broken, or of another version.
-        ConfigurationError: a field is missing, unknown or wrong.
-    """
-    try:
-        values = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as {what} ({error})") from None
-    found = values.get("schema") if isinstance(values, dict) else None
-    if found != schema:
-        raise DataError(f"{path}: {what} of version {found}, this package reads {schema}")
-    return from_dict(cls, values, str(path))
+        Args:
+            words: The command line, program first.
+        """
+        return {
+            "schema": cls.version,
+            "command": shlex.join(words),
+            "created": provenance.now(),
+            "versions": provenance.versions(),
+        }

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError, UnknownNameError
 from ..envs.settings import load
-from .benchmark import ALL_RUNGS, ladder_names
+from .benchmark import BENCHMARK, benchmark_policies
 from .suite import CueSource, labels
 
 if TYPE_CHECKING:
@@ -47,14 +47,18 @@ def find_car(name: str) -> Car:
 def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
     """Label and name (or file) of each policy; those meant for a machine where none is named.
 
-    `ladder` stands for its policies. A file is never labeled as a shipped policy: shares refer to those.
+    `benchmark` stands for its policies. A file is never labeled as a shipped policy: scores refer to those.
     """
     from .policies import default_policies, policy_names
 
+    if "ladder" in names:
+        raise ConfigurationError(f"unknown policy 'ladder'; it is called {BENCHMARK!r} now")
     known = policy_names()
     asked = list(names) or default_policies(platform)
-    wanted = [name for given in asked for name in (ladder_names(known) if given == ALL_RUNGS else [given])]
-    found = labels(wanted, [_label("policy", name, [*known, ALL_RUNGS]) for name in wanted], known)
+    wanted = [
+        name for given in asked for name in (benchmark_policies(known) if given == BENCHMARK else [given])
+    ]
+    found = labels(wanted, [_label("policy", name, [*known, BENCHMARK]) for name in wanted], known)
     return {label: name for name, label in found.items()}
 
 

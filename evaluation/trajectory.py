@@ -1,4 +1,4 @@
-"""What happened in one drive: cues wanted and felt, motion of the machine, use of its limits; in one file."""
+"""The trajectory of one drive: cues of car and simulator, motion of the machine, use of its limits."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from ..envs.storage import write_bytes
 Floats = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 
-SCHEMA: Final = 1
-"""Version of the file; a reader refuses others."""
+SCHEMA: Final = 2
+"""Version of the file; version 1, whose arrays have other names, is read, too."""
 
 AT_DISPLACEMENT: Final = 1
 """Bit of :attr:`Trajectory.limits_active`: an actuator brakes before its end of travel, or rests there."""
@@ -56,6 +56,19 @@ _COLUMNS: Final[Mapping[str, tuple[int, ...]]] = {
     "limits_active": (9,),
     "step_time": (),
 }
+_OLD_NAMES: Final[Mapping[str, str]] = {
+    "f_reference": "f_wanted",
+    "w_reference": "w_wanted",
+    "head_f_reference": "head_f_wanted",
+    "f_simulator": "f_felt",
+    "w_simulator": "w_felt",
+    "head_f_simulator": "head_f_felt",
+    "perceived_f_reference": "sensed_f_wanted",
+    "perceived_w_reference": "sensed_w_wanted",
+    "perceived_f_simulator": "sensed_f_felt",
+    "perceived_w_simulator": "sensed_w_felt",
+}
+"""Arrays of version 1."""
 _LIMITS: Final = ("position_min", "position_max", "velocity", "acceleration")
 _NAMES: Final = ("maneuver", "policy", "platform", "car")
 
@@ -117,7 +130,7 @@ class Trajectory:
         turntable_rate: (n,) rad/s.
         legs: (n, 6) extensions from neutral, m.
         legs_rate: (n, 6) m/s.
-        action: (n, 9) accelerations asked in the step that ended at this row, by :data:`AXES`;
+        action: (n, 9) accelerations requested in the step that ended at this row, by :data:`AXES`;
             m/s^2 and rad/s^2; zero in row 0.
         applied: (n, 9) accelerations that truly acted in that step.
         limits_active: (n, 9) bits :data:`AT_DISPLACEMENT`, :data:`AT_VELOCITY`, :data:`AT_ACCELERATION`
@@ -200,7 +213,7 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
-        """Read a file that :meth:`save` wrote.
+        """Read a file that :meth:`save` wrote, in this or an earlier version.
 
         Raises:
             DataError: the file is missing, broken, or of another version.
@@ -208,10 +221,13 @@ class Trajectory:
         content = _read(path)
         try:
             about = json.loads(str(content.pop("about")))
-            if about["schema"] != SCHEMA:
+            if about["schema"] not in (1, SCHEMA):
                 raise DataError(
-                    f"{path}: trajectory of version {about['schema']}, this package reads {SCHEMA}"
+                    f"{path}: trajectory of version {about['schema']}, this package reads 1 to {SCHEMA}"
                 )
+            for name, old in _OLD_NAMES.items():
+                if old in content:
+                    content[name] = content.pop(old)
             limits = LimitTable(**{name: content.pop(f"limit_{name}") for name in _LIMITS})
             names: dict[str, Any] = {name: str(about[name]) for name in _NAMES}
             columns: dict[str, Any] = {name: content[name] for name in _COLUMNS}

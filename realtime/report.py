@@ -7,11 +7,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import Final, Protocol
 
+from ..envs.provenance import hardware
 from ..envs.settings import configuration
-from ..evaluation.provenance import head_of
 from ..evaluation.reporting.text import NOTHING, TextTable, print_table, table_console
 from ..evaluation.saved import Headed
-from ..train.provenance import hardware
 from .timing import QUANTILES, Histogram, Pace, TimingSummary
 from .watchdog import State
 
@@ -76,7 +75,7 @@ def report_of(
         faults: In words.
     """
     return LoopReport(
-        **head_of(LoopReport, words),
+        **LoopReport.head(words),
         hardware=hardware("cpu"),
         duration=who.duration,
         periods=periods,

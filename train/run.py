@@ -14,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 import torch
 
+from ..envs import provenance
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.settings import load, save
 from ..envs.storage import check_folder, replacing, write_text
-from . import provenance
 from .config import TrainingConfig
 from .registry import State
 

@@ -16,12 +16,12 @@ from ...envs.errors import DataError
 from ...envs.maneuvers import RandomDrives
 from ...envs.maneuvers.roads import KINDS
 from ...envs.platform import Platform
+from ...envs.provenance import package_version
 from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.storage import write_text
 from ...envs.task import RandomizationOptions, TaskOptions
 from ...envs.task.drives import machines_of
-from ..provenance import package_version
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
 from ..results import save_rows
 from ..saved import Headed

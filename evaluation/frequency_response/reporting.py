@@ -13,13 +13,13 @@ from matplotlib.axis import Axis
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from ...envs.provenance import versions
 from ...envs.settings import configuration
-from .. import saved
 from ..metrics import CUE_AXES, Criteria
-from ..provenance import versions
 from ..reporting.figures import CAR, line_styles, new_figure, png, styled
 from ..reporting.text import NOTHING, TextTable, number
 from ..results import save_rows
+from ..saved import Saved
 from .response import FrequencyResponse
 
 SCHEMA: Final = 1
@@ -95,7 +95,7 @@ def save_csv(responses: Sequence[FrequencyResponse], path: Path) -> None:
 
 
 @configuration
-class SavedResponses:
+class SavedResponses(Saved):
     """What ``frequency-response.json`` holds.
 
     Args:
@@ -105,6 +105,9 @@ class SavedResponses:
         responses: One a policy.
     """
 
+    what = "frequency responses"
+    version = SCHEMA
+
     schema: int
     command: str
     versions: dict[str, str]
@@ -113,7 +116,7 @@ class SavedResponses:
 
 def save_json(responses: Sequence[FrequencyResponse], arguments: Sequence[str], path: Path) -> None:
     """Write everything, with the command line and the versions that made it."""
-    saved.save_json(SavedResponses(SCHEMA, shlex.join(arguments), versions(), tuple(responses)), path)
+    SavedResponses(SCHEMA, shlex.join(arguments), versions(), tuple(responses)).save_json(path)
 
 
 def load_json(path: str | Path) -> list[FrequencyResponse]:
@@ -123,7 +126,7 @@ def load_json(path: str | Path) -> list[FrequencyResponse]:
         DataError: the file is missing, broken, or of another version.
         ConfigurationError: a field is missing, unknown or wrong.
     """
-    return list(saved.load_json(SavedResponses, path, "frequency responses", SCHEMA).responses)
+    return list(SavedResponses.load_json(path).responses)
 
 
 # Bode plots of frequency responses: each axis to itself, and every axis to every other.
@@ -175,7 +178,7 @@ def matrix_figure(responses: Sequence[FrequencyResponse], criteria: Criteria | N
 
     Inputs that were not measured have no column.
     """
-    scales = dict(zip(CUE_AXES, (criteria or Criteria()).scales, strict=True))
+    scales = dict(zip(CUE_AXES, (criteria or Criteria()).indifference_zone, strict=True))
     inputs = _inputs(responses)
     with styled():
         figure = new_figure(max(9.0, 2.8 + 1.7 * len(inputs)), 11.0)

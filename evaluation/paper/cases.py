@@ -1,11 +1,9 @@
-"""Figures 5 to 9 of the paper: the same axes and curves."""
+"""The paper's six cases on its machine: its Figures 5 to 9, and its statements with a pass or a fail each."""
 
 from __future__ import annotations
 
 import base64
-import json
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
@@ -22,29 +20,127 @@ from ...envs.car import get_car
 from ...envs.cues import GRAVITY
 from ...envs.maneuvers import get_maneuver
 from ...envs.platform import get_platform
-from ...envs.settings import to_dict
+from ...envs.provenance import versions
+from ...envs.settings import configuration
 from ...envs.storage import write_bytes, write_text
-from ..provenance import versions
 from ..reporting.figures import CAR, new_figure, png, styled
 from ..reporting.text import number
 from ..rollout import rollout
+from ..saved import Saved
 from ..trajectory import Floats, Trajectory
 from .statements import Check, Drives, all_checks, predicted_ripple
 
-_TURNS = ("EST1", "EST2", "EST3")
-_ARROW_EVERY = 2.0
+CASES: Final = {
+    "EST1": ("steady-turn", "est1"),
+    "EST2": ("steady-turn", "est2"),
+    "EST3": ("steady-turn", "est3"),
+    "BRK": ("braking", "brk"),
+    "LC1": ("lane-change", "lc1"),
+    "LC2": ("lane-change", "lc2"),
+}
+"""Maneuver and washout preset of each case."""
+_HEADER: Final = ("case", "quantity", "the paper says", "measured", "passes within", "")
+_TURNS: Final = ("EST1", "EST2", "EST3")
+_ARROW_EVERY: Final = 2.0
 """Seconds between the arrows that show where the cab points."""
 
 
-def paper_figures(drives: Drives) -> dict[str, bytes]:
-    """PNG of each figure by its caption."""
+@configuration
+class PaperResults(Saved):
+    """The measured statements: ``paper.json``.
+
+    Args:
+        schema: Version of the file.
+        versions: Of this package, Python and the libraries that matter.
+        checks: The statements.
+    """
+
+    what = "the paper's cases"
+    version = 1
+
+    schema: int
+    versions: dict[str, str]
+    checks: tuple[Check, ...]
+
+    @classmethod
+    def upgrade(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Whether a statement passes follows from its numbers."""
+        checks = [{k: v for k, v in check.items() if k != "passed"} for check in values.get("checks", ())]
+        return {**values, "checks": checks}
+
+
+def run(out: Path) -> int:
+    """Drive the cases, write everything to a folder and print the table; 0 if every check passes, else 1."""
+    drives = drive_cases()
+    results = PaperResults(PaperResults.version, versions(), tuple(all_checks(drives)))
+    save(drives, results, out)
+    print_checks(results.checks)
+    return 0 if all(check.passed for check in results.checks) else 1
+
+
+def drive_cases() -> dict[str, Trajectory]:
+    """The six cases on the paper's machine with the paper's car."""
+    platform, car = get_platform("paper"), get_car("sedan")
+    cues = {name: get_maneuver(name).drive(car) for name in {maneuver for maneuver, _ in CASES.values()}}
+    return {
+        case: rollout(make_policy(preset, platform), cues[maneuver], platform, car)
+        for case, (maneuver, preset) in CASES.items()
+    }
+
+
+def save(drives: Drives, results: PaperResults, out: Path) -> None:
+    """Write paper.json, paper.html, the figures and the trajectories."""
+    images = {caption: png(figure) for caption, figure in paper_figures(drives).items()}
+    for caption, image in images.items():
+        name = caption.split(":")[0].lower().replace(" ", "-")
+        write_bytes(out / f"{name}.png", image)
+    for case, drive in drives.items():
+        drive.save(out / "trajectories" / f"{case.lower()}.npz")
+    results.save_json(out / "paper.json")
+    source = files(__package__).joinpath("paper.html").read_text(encoding="utf-8")
+    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(source)
+    embedded = {caption: base64.b64encode(image).decode("ascii") for caption, image in images.items()}
+    rows = _rows(results.checks)
+    text = page.render(header=_HEADER, rows=rows, images=embedded, versions=results.versions)
+    write_text(out / "paper.html", text)
+
+
+def print_checks(checks: Sequence[Check]) -> None:
+    """The table on the terminal."""
+    table = Table(title="The paper's statements, measured", title_justify="left")
+    for name in _HEADER:
+        table.add_column(name, justify="right" if name == "measured" else "left")
+    for row in _rows(checks):
+        table.add_row(*row, style=None if row[-1] == "pass" else "bold red")
+    passed = sum(check.passed for check in checks)
+    console = Console(width=None if Console().is_terminal else 140)
+    console.print(table)
+    console.print(f"{passed} of {len(checks)} pass", highlight=False)
+
+
+def _rows(checks: Sequence[Check]) -> list[tuple[str, ...]]:
+    return [
+        (
+            check.case,
+            check.quantity,
+            check.reported,
+            f"{number(check.measured)} {check.unit}".strip(),
+            f"{check.low:g} to {check.high:g}",
+            "pass" if check.passed else "FAIL",
+        )
+        for check in checks
+    ]
+
+
+def paper_figures(drives: Drives) -> Mapping[str, Figure]:
+    """Each figure by its caption."""
     with styled():
         return {
-            "Figure 5: driver's lateral specific force, entry and steady turn": png(_lateral_force(drives)),
-            "Figure 6: simulator trajectories for EST1, EST2 and EST3": png(_trajectories(drives)),
-            "Figure 7: yaw rate, entry and steady turn": png(_yaw_rate(drives)),
-            "Figure 8: driver's longitudinal specific force, braking": png(_braking(drives)),
-            "Figure 9: driver's lateral specific force, single lane change": png(_lane_change(drives)),
+            "Figure 5: driver's lateral specific force, entry and steady turn": _force(drives, 1, *_TURNS),
+            "Figure 6: simulator trajectories for EST1, EST2 and EST3": _trajectories(drives),
+            "Figure 7: yaw rate, entry and steady turn": _yaw_rate(drives),
+            "Figure 8: driver's longitudinal specific force, braking": _force(drives, 0, "BRK"),
+            "Figure 9: driver's lateral specific force, single lane change": _force(drives, 1, "LC1", "LC2"),
         }
 
 
@@ -57,7 +153,14 @@ def _curves(axes: Axes, time: Floats, car: Floats, simulators: dict[str, Floats]
     axes.legend()
 
 
-def _in_g(axes: Axes) -> None:
+def _force(drives: Drives, axis: int, *cases: str) -> Figure:
+    """The specific force of a car and of its cases on one axis, in m/s^2 and g."""
+    figure = new_figure(8.0, 4.2)
+    axes = figure.subplots()
+    first = drives[cases[0]]
+    simulated = {case: drives[case].f_simulator[:, axis] for case in cases}
+    _curves(axes, first.time, first.f_reference[:, axis], simulated, f"$f_{'xy'[axis]}$, m/s²")
+
     def to_g(force: Any) -> Any:
         return force / GRAVITY
 
@@ -65,20 +168,6 @@ def _in_g(axes: Axes) -> None:
         return force * GRAVITY
 
     axes.secondary_yaxis("right", functions=(to_g, from_g)).set_ylabel("g")
-
-
-def _lateral_force(drives: Drives) -> Figure:
-    figure = new_figure(8.0, 4.2)
-    axes = figure.subplots()
-    first = drives["EST1"]
-    _curves(
-        axes,
-        first.time,
-        first.f_reference[:, 1],
-        {n: drives[n].f_simulator[:, 1] for n in _TURNS},
-        "$f_y$, m/s²",
-    )
-    _in_g(axes)
     return figure
 
 
@@ -120,108 +209,3 @@ def _yaw_rate(drives: Drives) -> Figure:
     lower.set_ylabel("false yaw rate, deg/s")
     lower.legend()
     return figure
-
-
-def _braking(drives: Drives) -> Figure:
-    figure = new_figure(8.0, 4.2)
-    axes = figure.subplots()
-    t = drives["BRK"]
-    _curves(axes, t.time, t.f_reference[:, 0], {"BRK": t.f_simulator[:, 0]}, "$f_x$, m/s²")
-    _in_g(axes)
-    return figure
-
-
-def _lane_change(drives: Drives) -> Figure:
-    figure = new_figure(8.0, 4.2)
-    axes = figure.subplots()
-    t = drives["LC1"]
-    simulators = {name: drives[name].f_simulator[:, 1] for name in ("LC1", "LC2")}
-    _curves(axes, t.time, t.f_reference[:, 1], simulators, "$f_y$, m/s²")
-    _in_g(axes)
-    return figure
-
-
-# The paper's six cases, its Figures 5 to 9, and its statements with a pass or a fail each.
-
-
-SCHEMA: Final = 1
-"""Version of paper.json."""
-
-CASES: Final = {
-    "EST1": ("steady-turn", "est1"),
-    "EST2": ("steady-turn", "est2"),
-    "EST3": ("steady-turn", "est3"),
-    "BRK": ("braking", "brk"),
-    "LC1": ("lane-change", "lc1"),
-    "LC2": ("lane-change", "lc2"),
-}
-"""Maneuver and washout preset of each case."""
-
-
-def drive_cases() -> dict[str, Trajectory]:
-    """The six cases on the paper's machine with the paper's car."""
-    platform, car = get_platform("paper"), get_car("sedan")
-    cues = {name: get_maneuver(name).drive(car) for name in {maneuver for maneuver, _ in CASES.values()}}
-    return {
-        case: rollout(make_policy(preset, platform), cues[maneuver], platform, car)
-        for case, (maneuver, preset) in CASES.items()
-    }
-
-
-def run(out: Path) -> int:
-    """Drive the cases, write everything to a folder and print the table; 0 if every check passes, else 1."""
-    drives = drive_cases()
-    checks = all_checks(drives)
-    save(drives, checks, out)
-    print_checks(checks)
-    return 0 if all(check.passed for check in checks) else 1
-
-
-def save(drives: Drives, checks: Sequence[Check], out: Path) -> None:
-    """Write paper.json, paper.html, the figures and the trajectories."""
-    figures = paper_figures(drives)
-    for caption, image in figures.items():
-        write_bytes(out / f"{_slug(caption.split(':')[0])}.png", image)
-    for case, drive in drives.items():
-        drive.save(out / "trajectories" / f"{case.lower()}.npz")
-    record = {
-        "schema": SCHEMA,
-        "versions": versions(),
-        "checks": [{**to_dict(check), "passed": check.passed} for check in checks],
-    }
-    write_text(out / "paper.json", json.dumps(record, indent=2) + "\n")
-    source = files(__package__).joinpath("paper.html").read_text(encoding="utf-8")
-    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(source)
-    images = {caption: base64.b64encode(image).decode("ascii") for caption, image in figures.items()}
-    write_text(out / "paper.html", page.render(rows=_rows(checks), images=images, versions=versions()))
-
-
-def print_checks(checks: Sequence[Check]) -> None:
-    """The table on the terminal."""
-    table = Table(title="The paper's statements, measured", title_justify="left")
-    for name in ("case", "quantity", "the paper says", "measured", "passes within", ""):
-        table.add_column(name, justify="right" if name == "measured" else "left")
-    for row in _rows(checks):
-        table.add_row(*row, style=None if row[-1] == "pass" else "bold red")
-    passed = sum(check.passed for check in checks)
-    console = Console(width=None if Console().is_terminal else 140)
-    console.print(table)
-    console.print(f"{passed} of {len(checks)} pass", highlight=False)
-
-
-def _rows(checks: Sequence[Check]) -> list[tuple[str, ...]]:
-    return [
-        (
-            check.case,
-            check.quantity,
-            check.reported,
-            f"{number(check.measured)} {check.unit}".strip(),
-            f"{check.low:g} to {check.high:g}",
-            "pass" if check.passed else "FAIL",
-        )
-        for check in checks
-    ]
-
-
-def _slug(text: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")

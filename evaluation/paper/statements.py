@@ -1,4 +1,4 @@
-"""What the paper reports of its six cases, measured: each statement a number with bounds."""
+"""The statements of the paper on its six cases, measured: each one is a number with bounds."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
+from pydantic import computed_field
 
 from ...envs.cues import GRAVITY
 from ...envs.settings import configuration
@@ -21,12 +22,12 @@ SETTLED: Final = 5.0
 
 @configuration
 class Check:
-    """One statement of the paper and what was measured.
+    """One statement of the paper and its measured number.
 
     Args:
         case: EST1 to LC2.
-        quantity: What is measured.
-        reported: What the paper says of it.
+        quantity: Name of the number.
+        reported: The words of the paper.
         measured: The number.
         unit: Of the number; empty for a pure one.
         low: Least value that passes.
@@ -41,6 +42,7 @@ class Check:
     low: float
     high: float
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def passed(self) -> bool:
         """Whether the number lies within its bounds."""

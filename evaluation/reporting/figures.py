@@ -1,4 +1,7 @@
-"""One look for every figure: colors that everyone can tell apart (Okabe and Ito), light grid, units."""
+"""The figures of an evaluation: one a maneuver, and the benchmark as bars; and the one look of all figures.
+
+Colors are those of Okabe and Ito, which everyone can tell apart.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +20,20 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FuncFormatter
 
 from ...envs.platform.kernels import ACTUATORS
-from ..benchmark import Rung, rungs
-from ..comparison import STILL, gap_share
+from ..benchmark import benchmark
+from ..comparison import STILL, normalized_score
 from ..metrics import CUE_AXES, Criteria, cab_motion, cue_error, tilt_rate
 from ..results import Results
 from ..trajectory import Floats, Trajectory
+from .tables import SCORES, has_scores
 from .text import fraction, how_many, number
 
 CAR: Final = "#1a1a1a"
 LIMIT: Final = "#a61e1e"
 FLOOR: Final = 0.01
 """Least J on a logarithmic axis: what lies below is perfect to anyone, and is marked there."""
-LOWEST_SHARE: Final = -1.0
-"""Least share of the gap that is drawn; what lies below is marked there."""
+LOWEST_SCORE: Final = -1.0
+"""Least normalized score that is drawn; what lies below is marked there."""
 _COLORS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _DASHES: Final = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 _STILL_STYLE: Final = {"color": "#8a8a8a", "linestyle": (0, (2, 2)), "linewidth": 1.0}
@@ -108,11 +112,9 @@ def limit_lines(axes: Axes, low: float, high: float, used: float, unit: str, sho
 def png(figure: Figure) -> bytes:
     """The figure as PNG."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png")
+    with styled():
+        figure.savefig(buffer, format="png")
     return buffer.getvalue()
-
-
-# The figure of a maneuver: cues of car and simulator, tilt, travel, legs and limits, for each policy.
 
 
 _CUES = (
@@ -137,10 +139,10 @@ Styles = Mapping[str, Mapping[str, Any]]
 
 def maneuver_figure(
     drives: Drives, policies: list[str] | None = None, criteria: Criteria | None = None
-) -> bytes:
-    """A PNG that shows the trajectories of one maneuver.
+) -> Figure:
+    """The figure of a maneuver: cues of car and simulator, tilt, travel, legs and limits, for each policy.
 
-    Of more than eight policies it shows the references of the share and the best; its caption names the rest.
+    Of more than eight policies it shows the references of the score and the best; its caption names the rest.
 
     Args:
         drives: Trajectory of each policy (at least one), all of the same cues.
@@ -172,8 +174,10 @@ def maneuver_figure(
         columns = min(len(labels), 7)
         legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
         if others:
-            legend.set_title(_caption(others), FontProperties(size=8.5))
-        return png(figure)
+            lines = [", ".join(others[i : i + _NAMES_A_LINE]) for i in range(0, len(others), _NAMES_A_LINE)]
+            caption = "Shown: the references and the best. Numbers of the others are in the tables:\n"
+            legend.set_title(caption + ",\n".join(lines), FontProperties(size=8.5))
+    return figure
 
 
 def shown_policies(drives: Drives, criteria: Criteria) -> list[str]:
@@ -187,14 +191,6 @@ def shown_policies(drives: Drives, criteria: Criteria) -> list[str]:
     best = [name for name in sorted(errors, key=errors.__getitem__) if name not in references]
     chosen = {*references, *best[: _MOST - len(references)]}
     return [*references, *(name for name in best if name in chosen)]
-
-
-def _caption(others: list[str]) -> str:
-    """Names the policies that are not shown."""
-    lines = [", ".join(others[i : i + _NAMES_A_LINE]) for i in range(0, len(others), _NAMES_A_LINE)]
-    return "Shown: the references and the best. Numbers of the others are in the tables:\n" + ",\n".join(
-        lines
-    )
 
 
 def _label(axes: Axes, title: str, unit: str) -> None:
@@ -298,7 +294,7 @@ def _spread(heights: list[float], least: float) -> list[float]:
 
 
 def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> None:
-    """The cue error gathered so far; its last value is J, and beside it the share of the gap."""
+    """The cue error gathered so far; its last value is J, and beside it the normalized score."""
     ends: dict[str, float] = {}
     for name, drive in drives.items():
         error = np.cumsum(cue_error(*cab_motion(drive), criteria)) / len(drive)
@@ -310,15 +306,12 @@ def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> No
     axes.set_ylim(bottom=0.0)
     heights = _spread([end / axes.get_ylim()[1] for end in ends.values()], _LINE)
     for (name, end), height in zip(ends.items(), heights, strict=True):
-        share = gap_share(end, baseline, optimum)
-        text = f"{end:.2f}" if share is None else f"{end:.2f} ({share:.2f})"
+        score = normalized_score(end, baseline, optimum)
+        text = f"{end:.2f}" if score is None else f"{end:.2f} ({score:.2f})"
         style = {"color": styles[name]["color"], "fontsize": 8, "va": "center"}
         axes.annotate(text, (1.01, height), xycoords="axes fraction", annotation_clip=False, **style)
-    shares = "" if baseline is None or optimum is None else " (share of the gap)"
-    _label(axes, f"Cue error so far, to J{shares}", "J")
-
-
-# The ladder as bars: J of every policy, and its share of the gap.
+    scores = "" if baseline is None or optimum is None else " (normalized score)"
+    _label(axes, f"Cue error so far, to J{scores}", "J")
 
 
 _BAR_COLORS: Final = ("#0072b2", "#e69f00")
@@ -327,77 +320,69 @@ _HALF: Final = 0.19
 """Half the distance of a policy's two bars."""
 
 
-def ladder_figure(results: Results) -> bytes | None:
-    """A PNG of the ladder, or None with fewer than two policies to compare.
+def benchmark_figure(results: Results) -> Figure | None:
+    """The benchmark as bars: J of every policy and its normalized score; None with fewer than two policies.
 
-    The right panel is there where the references of the share are among the policies.
+    The right panel is there where the references of the score are among the policies.
     """
-    found = rungs(results)
-    if len(found) < 2:
+    rows = benchmark(results)
+    if len(rows) < 2:
         return None
-    has_share = any(r.standing.share is not None or r.standing.perceived_share is not None for r in found)
+    scored = has_scores(rows)
     with styled():
-        figure = new_figure(11.0 if has_share else 7.0, 1.3 + 0.42 * len(found))
-        panels = figure.subplots(1, 2 if has_share else 1, sharey=True, squeeze=False)[0]
-        _errors(panels[0], found)
-        if has_share:
-            _shares(panels[1], found)
-        panels[0].set_yticks(range(len(found)), [rung.policy for rung in found])
+        figure = new_figure(11.0 if scored else 7.0, 1.3 + 0.42 * len(rows))
+        panels = figure.subplots(1, 2 if scored else 1, sharey=True, squeeze=False)[0]
+        _error_bars(panels[0], [rows["cue_error"].tolist(), rows["perceived_cue_error"].tolist()])
+        if scored:
+            _score_bars(panels[1], [rows[name].astype(float).tolist() for name in SCORES])
+        panels[0].set_yticks(range(len(rows)), rows["policy"].tolist())
         panels[0].invert_yaxis()
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
-        title = f"The ladder of controllers, means over {how_many(found[0].standing.maneuvers, 'drive')}"
+        drives = how_many(int(rows["maneuvers"].iloc[0]), "drive")
         where = f"car {results.provenance.car}, motion base {results.provenance.platform}"
-        figure.suptitle(f"{title} ({where})", fontsize=11, x=0.01, ha="left")
-        return png(figure)
+        title = f"Benchmark of the controllers, means over {drives} ({where})"
+        figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    return figure
 
 
-def _errors(axes: Axes, found: list[Rung]) -> None:
-    values = [[r.standing.cue_error for r in found], [r.standing.perceived_cue_error for r in found]]
+def _error_bars(axes: Axes, values: list[list[float]]) -> None:
     least = max(FLOOR, min((v for row in values for v in row if v > 0.0), default=1.0))
     for i, row in enumerate(values):
-        _bars(axes, i, [max(v, least) for v in row])
-        for k, value in enumerate(row):
-            cut = "◂ " if value < least else ""
-            _tell(axes, max(value, least), k, i, f"{cut}{number(value)}")
+        _bars(axes, i, row, least, number)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlim(0.6 * least, 2.5 * max(least, *(max(row) for row in values)))
-    axes.set_title("Mean J (logarithmic; below 1 within what a driver minds)")
+    axes.set_title("Mean J (logarithmic; below 1 within the indifference zone)")
     axes.axvline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     axes.grid(axis="y", visible=False)
 
 
-def _shares(axes: Axes, found: list[Rung]) -> None:
-    for i, row in enumerate([[r.standing.share for r in found], [r.standing.perceived_share for r in found]]):
-        _bars(axes, i, [0.0 if v is None else max(v, LOWEST_SHARE) for v in row])
-        for k, value in enumerate(row):
-            if value is not None:
-                cut = "◂ " if value < LOWEST_SHARE else ""
-                _tell(axes, max(value, LOWEST_SHARE), k, i, f"{cut}{fraction(value)}")
-    axes.set_xlim(LOWEST_SHARE - 0.25, 1.25)
+def _score_bars(axes: Axes, values: list[list[float]]) -> None:
+    for i, row in enumerate(values):
+        _bars(axes, i, row, LOWEST_SCORE, fraction)
+    axes.set_xlim(LOWEST_SCORE - 0.25, 1.25)
     axes.axvline(0.0, color=CAR, linewidth=0.8)
     axes.axvline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
-    axes.set_title("Share of the gap: 0 tuned washout, 1 optimum")
+    axes.set_title("Normalized score: 0 reference washout, 1 optimum")
     axes.grid(axis="y", visible=False)
 
 
-def _bars(axes: Axes, i: int, values: list[float]) -> Any:
+def _bars(axes: Axes, i: int, values: list[float], least: float, text: Callable[[float], str]) -> None:
+    """One bar a policy with its number at the end; a value below the least ends there and is marked."""
     rows = np.arange(len(values)) + (2 * i - 1) * _HALF
-    return axes.barh(rows, values, height=1.8 * _HALF, color=_BAR_COLORS[i], label=_NAMES[i])
-
-
-def _tell(axes: Axes, value: float, k: int, i: int, text: str) -> None:
-    """The number at the end of a bar."""
-    left = value < 0.0
-    axes.annotate(
-        text,
-        (value, k + (2 * i - 1) * _HALF),
-        xytext=(-3 if left else 3, 0),
-        textcoords="offset points",
-        ha="right" if left else "left",
-        va="center",
-        fontsize=7.5,
-        color="#444444",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
-    )
+    ends = [0.0 if np.isnan(value) else max(value, least) for value in values]
+    axes.barh(rows, ends, height=1.8 * _HALF, color=_BAR_COLORS[i], label=_NAMES[i])
+    for row, value, end in zip(rows, values, ends, strict=True):
+        if not np.isnan(value):
+            axes.annotate(
+                f"{'◂ ' if value < least else ''}{text(value)}",
+                (end, row),
+                xytext=(-3 if end < 0.0 else 3, 0),
+                textcoords="offset points",
+                ha="right" if end < 0.0 else "left",
+                va="center",
+                fontsize=7.5,
+                color="#444444",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+            )

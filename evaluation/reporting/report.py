@@ -13,7 +13,8 @@ from jinja2 import Environment, StrictUndefined
 
 from ...envs.settings import to_dict
 from ...envs.storage import write_text
-from ..benchmark import ladder_table
+from ..benchmark import benchmark_table
+from ..metrics import METRICS
 from ..results import Results
 from .tables import (
     axis_table,
@@ -21,21 +22,21 @@ from .tables import (
     maneuver_table,
     matrix_table,
     notes_table,
-    share_table,
-    standings_table,
+    score_table,
+    suite_table,
 )
 
 _DARKEST: Final = 0.35
 """Opacity of the best cell of a row."""
 
 
-def render(results: Results, figures: Mapping[str, bytes], ladder: bytes | None = None) -> str:
+def render(results: Results, figures: Mapping[str, bytes], benchmark: bytes | None = None) -> str:
     """The page.
 
     Args:
         results: What to report.
         figures: PNG by maneuver; those missing are left out.
-        ladder: PNG of the ladder.
+        benchmark: PNG of the benchmark.
     """
     source = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
     environment = Environment(
@@ -44,11 +45,12 @@ def render(results: Results, figures: Mapping[str, bytes], ladder: bytes | None 
     configuration = {"criteria": to_dict(results.criteria), **results.provenance.configuration}
     return environment.from_string(source).render(
         results=results,
-        standings=standings_table(results),
-        ladder=ladder_table(results),
-        ladder_image=_embedded(ladder),
+        definitions={name: METRICS[name].definition for name in ("cue_error", "perceived_cue_error")},
+        suite=suite_table(results),
+        benchmark=benchmark_table(results),
+        benchmark_image=_embedded(benchmark),
         matrix=matrix_table(results),
-        shares=share_table(results),
+        scores=score_table(results),
         heat=_heat(results),
         parts=[_part(results, name, figures.get(name)) for name in results.maneuvers],
         configuration=yaml.safe_dump(configuration, sort_keys=False, allow_unicode=True),
@@ -56,10 +58,10 @@ def render(results: Results, figures: Mapping[str, bytes], ladder: bytes | None 
 
 
 def save_report(
-    results: Results, figures: Mapping[str, bytes], path: str | Path, ladder: bytes | None = None
+    results: Results, figures: Mapping[str, bytes], path: str | Path, benchmark: bytes | None = None
 ) -> None:
     """Write the page, whole or not at all."""
-    write_text(path, render(results, figures, ladder))
+    write_text(path, render(results, figures, benchmark))
 
 
 def _embedded(image: bytes | None) -> str | None:
@@ -70,7 +72,7 @@ def _part(results: Results, maneuver: str, figure: bytes | None) -> dict[str, An
     drives = results.maneuvers[maneuver]
     return {
         "name": maneuver,
-        "headline": maneuver_table(maneuver, drives, results.shares.get(maneuver)),
+        "headline": maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)),
         "verdict": next(verdict for verdict in results.verdicts if verdict.maneuver == maneuver),
         "axes": axis_table(maneuver, drives),
         "machine": machine_table(maneuver, drives),

@@ -1,206 +1,212 @@
-"""The tables of an evaluation, as rows of text that a terminal and a report share."""
+"""The tables of an evaluation, for a terminal and a report. Metrics declare the tables they stand in."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 from rich.markup import escape
 
-from ..comparison import Share
-from ..metrics import CUE_AXES, Metrics
+from ..comparison import NormalizedScore
+from ..metrics import CUE_AXES, METRICS, OF_AXIS, ActuatorMetrics, AxisMetrics, Metrics, Table, declared
 from ..results import Results
 from ..suite import print_troubles
-from .text import NOTHING, TextTable, degrees, fraction, microseconds, number, percent, print_table
+from .text import NOTHING, TextTable, degrees, fraction, is_missing, number, percent, print_table
 
-SHARE_HEADER: Final = ("share of the gap", "perceived share")
-"""Columns of :func:`share_cells`."""
+if TYPE_CHECKING:
+    import pandas as pd
 
-
-def largest_stroke(metrics: Metrics) -> tuple[str, float | None]:
-    """The actuator that uses most of its travel, and the share."""
-    shares = {
-        name: use.stroke_share for name, use in metrics.actuators.items() if use.stroke_share is not None
-    }
-    if not shares:
-        return NOTHING, None
-    name = max(shares, key=lambda key: shares[key])
-    return name, shares[name]
+SCORES: Final = {
+    "normalized_score": "normalized score",
+    "perceived_normalized_score": "perceived score",
+}
+"""Columns of the normalized scores and their headers; shown where any policy has a score."""
 
 
-def share_cells(share: Share) -> tuple[str, str]:
-    """Cells under :data:`SHARE_HEADER`."""
-    return fraction(share.cue_error), fraction(share.perceived_cue_error)
+Cell = Callable[[Mapping[str, Any]], str]
+"""The text of a cell from the row of a frame."""
 
 
-def has_shares(shares: Iterable[Share]) -> bool:
-    """Whether any share is defined: both references are among the policies."""
-    return any(share != Share() for share in shares)
+def policy_table(title: str, frame: pd.DataFrame, table: Table, more: Mapping[str, Cell] = {}) -> TextTable:
+    """A table with a row a policy; the one with the lowest J is stressed.
+
+    Args:
+        title: Above it.
+        frame: Rows in SI units: ``policy`` and metrics by name; scores and worst axis where there are any.
+        table: The metrics that declare this table are its columns.
+        more: Further columns by header.
+    """
+    columns: dict[str, Cell] = {"policy": lambda row: row["policy"]}
+    metrics = {one.title: _metric_cell(name) for name, one in METRICS.items() if table in one.tables}
+    # J and the perceived J stand first, their scores beside them.
+    for header in list(metrics)[:2]:
+        columns[header] = metrics.pop(header)
+    if has_scores(frame):
+        columns |= {header: _score_cell(name) for name, header in SCORES.items()}
+    if "worst_axis" in frame:
+        columns["worst axis"] = _worst_axis
+    columns |= {**metrics, **more}
+    records: list[Any] = frame.to_dict("records")
+    rows = [tuple(cell(row) for cell in columns.values()) for row in records]
+    best = (int(frame["cue_error"].argmin()),) if rows else ()
+    return TextTable(title, tuple(columns), tuple(rows), best)
+
+
+def _metric_cell(name: str) -> Cell:
+    return lambda row: METRICS[name].display.text(row[name])
+
+
+def _score_cell(name: str) -> Cell:
+    return lambda row: fraction(row[name])
+
+
+def _worst_axis(row: Mapping[str, Any]) -> str:
+    part = row["worst_axis_part"]
+    return NOTHING if is_missing(part) else f"{row['worst_axis']} ({part:.0%})"
+
+
+def has_scores(frame: pd.DataFrame) -> bool:
+    """Whether any policy has a normalized score: a pair of references is among the policies."""
+    return any(name in frame and frame[name].notna().any() for name in SCORES)
 
 
 def maneuver_table(
-    maneuver: str, drives: Mapping[str, Metrics], shares: Mapping[str, Share] | None = None
+    maneuver: str, drives: Mapping[str, Metrics], scores: Mapping[str, NormalizedScore] | None = None
 ) -> TextTable:
     """The headline metrics of each policy on one maneuver, best first.
 
     Args:
         maneuver: For the title.
         drives: Metrics by policy.
-        shares: Share of the gap by policy; its columns are left out where none is defined.
+        scores: Normalized scores by policy.
     """
-    shown = shares if shares and has_shares(shares.values()) else None
-    header = (
-        "policy",
-        "J",
-        "perceived J",
-        *(SHARE_HEADER if shown else ()),
-        "worst axis",
-        "false cues %",
-        "missing %",
-        "tilt rate peak deg/s",
-        "at a limit %",
-        "most travel %",
-        "clipped %",
-        "step µs",
-    )
-    order = sorted(drives, key=lambda name: drives[name].cue_error)
-    rows = (_headline(name, drives[name], share_cells(shown[name]) if shown else ()) for name in order)
-    return TextTable(maneuver, header, tuple(rows), (0,))
+    import pandas as pd
+
+    rows = []
+    for policy in sorted(drives, key=lambda name: drives[name].cue_error):
+        m, score = drives[policy], (scores or {}).get(policy, NormalizedScore())
+        part = m.axes[m.worst_axis].cue_error / m.cue_error if m.cue_error > 0.0 else None
+        rows.append(
+            {name: getattr(m, name) for name in METRICS}
+            | {
+                "policy": policy,
+                "normalized_score": score.cue_error,
+                "perceived_normalized_score": score.perceived_cue_error,
+                "worst_axis": m.worst_axis,
+                "worst_axis_part": part,
+            }
+        )
+    more: dict[str, Cell] = {"most travel %": lambda row: _most_travel(drives[row["policy"]])}
+    return policy_table(maneuver, pd.DataFrame(rows), "drive", more)
 
 
-def _headline(name: str, m: Metrics, shares: tuple[str, ...]) -> tuple[str, ...]:
-    actuator, share = largest_stroke(m)
-    part = m.axes[m.worst_axis].cue_error / m.cue_error if m.cue_error > 0.0 else None
-    return (
-        name,
-        number(m.cue_error),
-        number(m.perceived_cue_error),
-        *shares,
-        NOTHING if part is None else f"{m.worst_axis} ({part:.0%})",
-        percent(m.false_cues),
-        percent(m.missing_cues),
-        degrees(m.tilt_rate_peak),
-        percent(m.at_limit),
-        f"{percent(share)} {actuator}" if share else percent(share),
-        percent(m.clipped),
-        microseconds(m.step_time_mean),
-    )
+def _most_travel(metrics: Metrics) -> str:
+    """The largest share of an actuator's travel, and which actuator it is."""
+    shares = {name: use.stroke_share or 0.0 for name, use in metrics.actuators.items()}
+    if all(use.stroke_share is None for use in metrics.actuators.values()):
+        return NOTHING
+    name = max(shares, key=shares.__getitem__)
+    return f"{percent(shares[name])} {name if shares[name] else ''}".strip()
 
 
 def axis_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
     """Every axis of every policy on one maneuver."""
-    header = (
-        "policy and axis",
-        "RMSE",
-        "unit",
-        "normalized",
-        "correlation",
-        "delay s",
-        "false %",
-        "missing %",
-        "part of J",
-        "perceived RMSE",
-        "perceived part",
-    )
-    rows = [_axis_row(name, axis, drives[name]) for name in drives for axis in CUE_AXES]
+    shown = [one for one in declared(AxisMetrics) if one.header]
+    rows = []
+    for policy, metrics in drives.items():
+        for axis in CUE_AXES:
+            force = axis.startswith("f")
+            of_axis = number if force else degrees
+            cells = [
+                (of_axis if one.display is OF_AXIS else one.display.text)(
+                    getattr(metrics.axes[axis], one.name)
+                )
+                for one in shown
+            ]
+            rows.append((f"{policy} {axis}", "m/s²" if force else "deg/s", *cells))
+    header = ("policy and axis", "unit", *(one.title for one in shown))
     return TextTable(f"{maneuver}: axes", header, tuple(rows))
 
 
-def _axis_row(name: str, axis: str, metrics: Metrics) -> tuple[str, ...]:
-    m = metrics.axes[axis]
-    force = axis.startswith("f")
-    shown = number if force else degrees
-    return (
-        f"{name} {axis}",
-        shown(m.rmse),
-        "m/s²" if force else "deg/s",
-        number(m.nrmse),
-        number(m.correlation),
-        NOTHING if m.delay is None else f"{m.delay:+.3f}",
-        percent(m.false_cues),
-        percent(m.missing_cues),
-        number(m.cue_error),
-        shown(m.perceived_rmse),
-        number(m.perceived_cue_error),
-    )
-
-
 def machine_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
-    """Stroke in percent of the limit and share of time at a limit, per actuator."""
+    """Use of every actuator by every policy on one maneuver."""
     actuators = list(next(iter(drives.values())).actuators)
     rows = []
     for name, metrics in drives.items():
-        used = [metrics.actuators[actuator] for actuator in actuators]
-        rows.append((f"{name}, stroke % of the limit", *(percent(use.stroke_share) for use in used)))
-        rows.append((f"{name}, time at a limit %", *(percent(use.at_limit) for use in used)))
+        for one in declared(ActuatorMetrics):
+            if one.header:
+                values = [getattr(metrics.actuators[actuator], one.name) for actuator in actuators]
+                rows.append((f"{name}, {one.title}", *map(one.display.text, values)))
     return TextTable(f"{maneuver}: use of the machine", ("policy", *actuators), tuple(rows))
 
 
 def notes_table(maneuver: str, notes: Mapping[str, Mapping[str, str]]) -> TextTable:
     """What each policy counted on one maneuver."""
-    rows = [(policy, name, text) for policy, found in notes.items() for name, text in found.items()]
-    return TextTable(f"{maneuver}: what policies counted", ("policy", "of", "counted"), tuple(rows))
+    rows = [(policy, name, text) for policy, counts in notes.items() for name, text in counts.items()]
+    return TextTable(f"{maneuver}: counts of the policies", ("policy", "of", "counted"), tuple(rows))
 
 
 def matrix_table(results: Results) -> TextTable:
     """J by maneuver and policy."""
-    policies = results.policies
-    rows = [
-        (maneuver, *(number(drives[name].cue_error) if name in drives else NOTHING for name in policies))
-        for maneuver, drives in results.maneuvers.items()
-    ]
-    return TextTable("J by maneuver", ("maneuver", *policies), tuple(rows))
+    return _by_maneuver("J by maneuver", results, "cue_error", number)
 
 
-def share_table(results: Results) -> TextTable:
-    """Share of the gap by maneuver and policy; without rows where no share is defined."""
-    policies = results.policies
-    rows = [
-        (maneuver, *(fraction(shares[name].cue_error if name in shares else None) for name in policies))
-        for maneuver, shares in results.shares.items()
-        if has_shares(shares.values())
-    ]
-    return TextTable("Share of the gap by maneuver", ("maneuver", *policies), tuple(rows))
+def score_table(results: Results) -> TextTable:
+    """Normalized score by maneuver and policy; without rows where none is defined."""
+    return _by_maneuver("Normalized score by maneuver", results, "normalized_score", fraction)
 
 
-def standings_table(results: Results) -> TextTable:
+def _by_maneuver(title: str, results: Results, column: str, text: Callable[[Any], str]) -> TextTable:
+    frame = results.frame()
+    header = ("maneuver", *results.policies)
+    if frame.empty:
+        return TextTable(title, header, ())
+    pivot = frame.pivot(index="maneuver", columns="policy", values=column)
+    pivot = pivot.reindex(index=list(results.maneuvers), columns=results.policies)
+    pivot = pivot.astype(float).dropna(how="all")
+    rows = [(maneuver, *map(text, row)) for maneuver, row in zip(pivot.index, pivot.to_numpy(), strict=True)]
+    return TextTable(title, header, tuple(rows))
+
+
+def suite_table(results: Results) -> TextTable:
     """The policies over the suite, best first."""
-    gaps = {s.policy: Share(s.share, s.perceived_share) for s in results.standings}
-    shown = has_shares(gaps.values())
+    scored = any(
+        s.normalized_score is not None or s.perceived_normalized_score is not None for s in results.scores
+    )
     rows = [
         (
             s.policy,
             number(s.cue_error),
             number(s.perceived_cue_error),
-            *(share_cells(gaps[s.policy]) if shown else ()),
+            *((fraction(s.normalized_score), fraction(s.perceived_normalized_score)) if scored else ()),
             f"{s.wins} of {s.maneuvers}",
             s.worst_maneuver,
         )
-        for s in results.standings
+        for s in results.scores
     ]
-    shares = SHARE_HEADER if shown else ()
-    header = ("policy", "mean J", "mean perceived J", *shares, "best on", "worst maneuver")
+    scores = SCORES.values() if scored else ()
+    header = ("policy", "mean J", "mean perceived J", *scores, "best on", "worst maneuver")
     return TextTable("The whole suite", header, tuple(rows), (0,))
 
 
 def print_results(console: Console, results: Results) -> None:
-    """Show a table a maneuver, the summary, the verdicts, what went wrong in solves, and failures."""
+    """Show a table a maneuver, the suite, the verdicts, wrong solves, skipped policies and failures."""
     for maneuver, drives in results.maneuvers.items():
-        print_table(console, maneuver_table(maneuver, drives, results.shares.get(maneuver)))
-    if results.standings:
-        print_table(console, standings_table(results))
+        print_table(console, maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)))
+    if results.scores:
+        print_table(console, suite_table(results))
     for verdict in results.verdicts:
         name = "Over the whole suite" if verdict.maneuver == "all" else verdict.maneuver
         console.print(f"[bold]{escape(name)}[/bold]: {escape(' '.join(verdict.sentences))}", highlight=False)
     counted = [
-        (policy, maneuver, found)
+        (policy, maneuver, counts)
         for maneuver, policies in results.notes.items()
-        for policy, found in policies.items()
+        for policy, counts in policies.items()
     ]
     print_troubles(console, counted)
-    for policy, reason in results.left_out.items():
-        console.print(f"[bold]left out[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
+    for policy, reason in results.skipped.items():
+        console.print(f"[bold]skipped[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
     for failure in results.failures:
         what = f"{failure.maneuver}, {failure.policy}" if failure.policy else failure.maneuver
         console.print(

@@ -1,4 +1,4 @@
-"""Tables as rows of text, how numbers are written in them, and how they are shown."""
+"""Text of reports: numbers, tables on a terminal and in Markdown, command lines, and names of files."""
 
 from __future__ import annotations
 
@@ -48,8 +48,13 @@ class TextTable:
     best: tuple[int, ...] = ()
 
 
+def is_missing(value: float | None) -> bool:
+    """Whether a value is undefined: None, or NaN as pandas has it."""
+    return value is None or math.isnan(value)
+
+
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with significant digits; a number that is no number has none."""
+    """A number with significant digits."""
     if value is None or math.isnan(value):
         return NOTHING
     if value == 0.0 or 1e-3 <= abs(value) < 1e5:
@@ -60,22 +65,27 @@ def number(value: float | None, digits: int = 3) -> str:
 
 def percent(share: float | None) -> str:
     """A share in percent."""
-    return NOTHING if share is None else f"{100.0 * share:.1f}"
+    return NOTHING if share is None or math.isnan(share) else f"{100.0 * share:.1f}"
 
 
 def degrees(value: float | None) -> str:
     """An angle or rate in degrees."""
-    return NOTHING if value is None else f"{math.degrees(value):.2f}"
+    return NOTHING if value is None or math.isnan(value) else f"{math.degrees(value):.2f}"
 
 
 def fraction(share: float | None) -> str:
-    """A share of the gap."""
-    return NOTHING if share is None else f"{share:.2f}"
+    """A normalized score, or another number near 1."""
+    return NOTHING if share is None or math.isnan(share) else f"{share:.2f}"
+
+
+def seconds(value: float | None) -> str:
+    """A time in seconds, with its sign."""
+    return NOTHING if value is None or math.isnan(value) else f"{value:+.3f}"
 
 
 def microseconds(value: float | None) -> str:
     """A time in microseconds."""
-    return NOTHING if value is None else f"{1e6 * value:.0f}"
+    return NOTHING if value is None or math.isnan(value) else f"{1e6 * value:.0f}"
 
 
 def table_console() -> Console:
@@ -155,11 +165,8 @@ def save_markdown(path: str | Path, *parts: TextTable | str) -> None:
     write_text(path, "\n\n".join(texts) + "\n")
 
 
-# The command line that gives a command: for reports, and to do it again; and numbers with their noun.
-
-
 def words_of(name: str, command: Any) -> list[str]:
-    """The words that give a command: the options that differ from their default.
+    """The command line that makes a result again: the options that differ from their default.
 
     Args:
         name: Of the subcommand.
@@ -179,9 +186,6 @@ def words_of(name: str, command: Any) -> list[str]:
 def how_many(count: int, noun: str) -> str:
     """A number and its noun: 1 drive, 2 drives."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-# Labels as parts of file names.
 
 
 def plain_name(label: str) -> str:

@@ -9,11 +9,13 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from ..reporting.figures import CAR, FLOOR, LOWEST_SHARE, line_styles, new_figure, png, styled
-from ..reporting.text import how_many, number
+from ..reporting.figures import CAR, FLOOR, LOWEST_SCORE, line_styles, new_figure, styled
+from ..reporting.tables import SCORES
+from ..reporting.text import NOTHING, how_many, number, percent
 from .results import StudyResults, Summary
 
 _WORST_RATIO: Final = 4.0
@@ -24,23 +26,23 @@ _BRIGHT: Final = 2.4
 """Ratio from which on numbers are white."""
 
 
-def lines_figure(results: StudyResults) -> bytes | None:
-    """A PNG of J and perceived J of each policy over the conditions, or None where nothing was driven.
+def lines_figure(results: StudyResults) -> Figure | None:
+    """J and perceived J of each policy over the conditions, or None where nothing was driven.
 
-    Panels of the share of the gap stand beside them where the references are among the policies.
+    Panels of the normalized score stand beside them where the references are among the policies.
     """
     if not results.summaries:
         return None
-    found = [s for policies in results.summaries.values() for s in policies.values()]
-    shares = any(s.share is not None or s.perceived_share is not None for s in found)
-    columns = 2 if shares else 1
+    rows = [s.row for policies in results.summaries.values() for s in policies.values()]
+    scored = any(row[name] is not None for row in rows for name in SCORES)
+    columns = 2 if scored else 1
     with styled():
         figure = new_figure(3.0 + columns * max(5.0, 1.1 * len(results.conditions) + 2.0), 8.5)
         grid = figure.subplots(2, columns, sharex=True, squeeze=False)
         for axes, perceived in zip(grid[:, 0], (False, True), strict=True):
             _errors(axes, results, perceived)
-        for axes, perceived in zip(grid[:, 1] if shares else (), (False, True), strict=False):
-            _shares(axes, results, perceived)
+        for axes, perceived in zip(grid[:, 1] if scored else (), (False, True), strict=False):
+            _scores(axes, results, perceived)
         names = list(results.conditions)
         for axes in grid[-1]:
             axes.set_xlim(-0.3, len(names) - 0.7)
@@ -49,7 +51,7 @@ def lines_figure(results: StudyResults) -> bytes | None:
         mean = f"Mean over {how_many(len(results.maneuvers), 'drive')}"
         title = f"How much machine does a controller need? {mean}"
         figure.suptitle(title, fontsize=12, x=0.01, ha="left")
-        return png(figure)
+    return figure
 
 
 def _errors(axes: Axes, results: StudyResults, perceived: bool) -> None:
@@ -59,18 +61,21 @@ def _errors(axes: Axes, results: StudyResults, perceived: bool) -> None:
     axes.set_ylim(bottom=max(axes.get_ylim()[0], 0.8 * FLOOR))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_title(
-        "Perceived J" if perceived else "J at the cab (logarithmic; below 1 within what a driver minds)"
+    axes.set_title("Perceived J" if perceived else "J at the cab; below 1 within the indifference zone")
+
+
+def _scores(axes: Axes, results: StudyResults, perceived: bool) -> None:
+    _lines(
+        axes,
+        results,
+        lambda s: s.perceived_normalized_score if perceived else s.normalized_score,
+        LOWEST_SCORE,
     )
-
-
-def _shares(axes: Axes, results: StudyResults, perceived: bool) -> None:
-    _lines(axes, results, lambda s: s.perceived_share if perceived else s.share, LOWEST_SHARE)
     axes.axhline(0.0, color=CAR, linewidth=0.8)
     axes.axhline(1.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
-    axes.set_ylim(LOWEST_SHARE - 0.1, 1.25)
-    about = "Perceived share of the gap" if perceived else "Share of the gap"
-    axes.set_title(f"{about}: 0 tuned washout, 1 optimum")
+    axes.set_ylim(LOWEST_SCORE - 0.1, 1.25)
+    about = "Perceived score" if perceived else "Normalized score"
+    axes.set_title(f"{about}: 0 reference washout, 1 optimum")
     if not any(np.isfinite(line.get_ydata(orig=False)).any() for line in axes.get_lines()[:-2]):
         axes.text(0.5, 0.4, "its optimum is not among the policies", transform=axes.transAxes, ha="center")
 
@@ -80,9 +85,8 @@ def _lines(axes: Axes, results: StudyResults, value: Callable[[Summary], float |
     styles = line_styles(results.driven)
     below = False
     for policy in results.driven:
-        found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
-        told = [None if summary is None else value(summary) for summary in found]
-        values = np.array([math.nan if v is None else v for v in told])
+        numbers = [None if summary is None else value(summary) for summary in results.across(policy)]
+        values = np.array([math.nan if v is None else v for v in numbers])
         low = values < floor
         shown = np.where(low, floor, values)
         axes.plot(range(len(values)), shown, label=policy, **styles[policy])
@@ -94,8 +98,8 @@ def _lines(axes: Axes, results: StudyResults, value: Callable[[Summary], float |
         axes.set_title(f"▾ below {floor:g}", loc="right", fontsize=7.5, fontweight="normal", color="#5d6878")
 
 
-def heat_figure(results: StudyResults) -> bytes | None:
-    """A PNG of J by policy and condition, colored by J over that of the first condition.
+def heat_figure(results: StudyResults) -> Figure | None:
+    """J by policy and condition, colored by J over that of the first condition.
 
     None where nothing was driven.
     """
@@ -109,10 +113,9 @@ def heat_figure(results: StudyResults) -> bytes | None:
         scale = LogNorm(1.0 / _WORST_RATIO, _WORST_RATIO)
         image = axes.imshow(_ratios(results), cmap="RdBu_r", norm=scale, aspect="auto", alpha=0.85)
         for i, policy in enumerate(policies):
-            for j, condition in enumerate(names):
-                found = results.summaries.get(condition, {}).get(policy)
-                color = "white" if found is not None and (found.ratio or 1.0) > _BRIGHT else CAR
-                text = _told(found, j == 0)
+            for j, summary in enumerate(results.across(policy)):
+                color = "white" if summary is not None and (summary.ratio or 1.0) > _BRIGHT else CAR
+                text = _cell(summary, j == 0)
                 axes.text(j, i, text, ha="center", va="center", fontsize=8, color=color)
         axes.set_xticks(range(len(names)), names)
         axes.set_yticks(range(len(policies)), policies)
@@ -123,21 +126,18 @@ def heat_figure(results: StudyResults) -> bytes | None:
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
         drives = how_many(len(results.maneuvers), "drive")
         axes.set_title(f"J, J over {names[0]}, time at a limit; mean over {drives}")
-        return png(figure)
+    return figure
 
 
 def _ratios(results: StudyResults) -> NDArray[np.float64]:
     """(policies, conditions) J over that under the first condition; NaN where there is none."""
-    rows = [
-        [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
-        for policy in results.driven
-    ]
+    rows = [results.across(policy) for policy in results.driven]
     return np.array([[math.nan if s is None or not s.ratio else s.ratio for s in row] for row in rows])
 
 
-def _told(found: Summary | None, first: bool) -> str:
-    """What stands in a cell."""
-    if found is None:
-        return "–"
-    ratio = "" if first or found.ratio is None else f"×{found.ratio:.2f}, "
-    return f"{number(found.cue_error)}\n{ratio}limits {found.at_limit:.1%}"
+def _cell(summary: Summary | None, first: bool) -> str:
+    """Text of a cell."""
+    if summary is None:
+        return NOTHING
+    ratio = "" if first or summary.ratio is None else f"×{summary.ratio:.2f}, "
+    return f"{number(summary.cue_error)}\n{ratio}limits {percent(summary.metrics['at_limit'])}%"

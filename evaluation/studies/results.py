@@ -1,25 +1,29 @@
-"""What a study found, over the drives that every pair finished; as JSON and CSV."""
+"""Results of a study: policies under several conditions, such as machines or disturbances.
+
+Means are over the drives that every pair of policy and condition finished. They are written as ``study.json``
+and ``study.csv`` and shown as tables.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
 from rich.markup import escape
 
-from ...envs.settings import configuration, to_dict
-from ..comparison import Share, shares
-from ..metrics import Criteria, Metrics
-from ..reporting.tables import SHARE_HEADER, has_shares, share_cells
-from ..reporting.text import NOTHING, TextTable, degrees, fraction, how_many, number, percent, print_table
-from ..results import save_rows
+from ...envs.settings import configuration, renamed
+from ..comparison import normalized_scores
+from ..metrics import METRICS, Criteria, Metrics, over_drives
+from ..reporting.tables import SCORES, Cell, policy_table
+from ..reporting.text import NOTHING, TextTable, fraction, how_many, number, percent, print_table
+from ..results import save_frame
 from ..saved import Headed
 from ..suite import print_troubles
 
-SCHEMA: Final = 1
-"""Version of ``study.json``."""
+SCHEMA: Final = 2
+"""Version of ``study.json``; version 1 is read, too."""
 
 
 @configuration
@@ -27,10 +31,10 @@ class StudyFailure:
     """A drive without a result.
 
     Args:
-        condition: Under which it was tried.
-        policy: Whose it is; None where the maneuver itself could not be made.
-        maneuver: That was driven.
-        message: What went wrong.
+        condition: Name of the condition.
+        policy: Name of the policy; None where the maneuver itself could not be made.
+        maneuver: Name of the maneuver.
+        message: The reason.
     """
 
     condition: str
@@ -44,26 +48,34 @@ class Summary:
     """One policy under one condition, over the drives that every pair finished.
 
     Args:
-        cue_error: Mean J.
-        perceived_cue_error: Mean perceived J.
-        share: Of the gap between the references under this condition; None where one is missing.
-        perceived_share: The same of the perceived J.
+        metrics: Each metric over the drives, as it declares; see ``metrics.over_drives``.
+        normalized_score: Of the mean J under this condition; None where a reference is missing.
+        perceived_normalized_score: The same of the perceived J.
         ratio: Mean J over that under the first condition; None where that is missing or 0.
-        false_cues: Mean share of time with a false cue.
-        tilt_rate_peak: Largest of all drives, rad/s.
-        at_limit: Mean share of time with any actuator at any limit.
         most_limited: Largest share of time at a limit of a drive.
     """
 
-    cue_error: float
-    perceived_cue_error: float
-    share: float | None
-    perceived_share: float | None
+    metrics: dict[str, float | None]
+    normalized_score: float | None
+    perceived_normalized_score: float | None
     ratio: float | None
-    false_cues: float
-    tilt_rate_peak: float
-    at_limit: float
     most_limited: float
+
+    @property
+    def cue_error(self) -> float:
+        """Mean J."""
+        return self.metrics["cue_error"] or 0.0
+
+    @property
+    def perceived_cue_error(self) -> float:
+        """Mean perceived J."""
+        return self.metrics["perceived_cue_error"] or 0.0
+
+    @property
+    def row(self) -> dict[str, float | None]:
+        """Every number by name, in SI units."""
+        others = ("normalized_score", "perceived_normalized_score", "ratio", "most_limited")
+        return {**self.metrics, **{name: getattr(self, name) for name in others}}
 
 
 @configuration
@@ -75,36 +87,41 @@ class StudyResults(Headed):
         policies: Names.
         maneuvers: In the means.
         summaries: By condition and policy.
-        left_out: By condition and policy: why it was not driven there.
         failures: Drives without a result.
         metrics: By condition, policy and maneuver.
-        notes: What policies counted, by condition, policy and maneuver, where they did.
+        notes: Counts of the policies, by condition, policy and maneuver, where they did.
         criteria: The thresholds the metrics were measured with.
+        skipped: Why a policy was not driven, by condition and policy.
     """
 
     what = "a study"
     version = SCHEMA
+    oldest = 1
 
     conditions: dict[str, str]
     policies: tuple[str, ...]
     maneuvers: tuple[str, ...]
     summaries: dict[str, dict[str, Summary]]
-    left_out: dict[str, dict[str, str]]
     failures: tuple[StudyFailure, ...]
     metrics: dict[str, dict[str, dict[str, Metrics]]]
     notes: dict[str, dict[str, dict[str, dict[str, str]]]]
     criteria: Criteria
+    skipped: dict[str, dict[str, str]] = renamed("skipped", "left_out")
 
     @property
     def driven(self) -> tuple[str, ...]:
-        """Policies with a result under any condition; the rest was left out or failed everywhere."""
-        found = {policy for policies in self.summaries.values() for policy in policies}
-        return tuple(policy for policy in self.policies if policy in found)
+        """Policies with a result under any condition; the others were skipped or failed everywhere."""
+        done = {policy for policies in self.summaries.values() for policy in policies}
+        return tuple(policy for policy in self.policies if policy in done)
 
-    def told_left_out(self) -> list[str]:
-        """A line for each policy and reason why it was left out, with the conditions where not under all."""
+    def across(self, policy: str) -> list[Summary | None]:
+        """Summaries of a policy under each condition."""
+        return [self.summaries.get(condition, {}).get(policy) for condition in self.conditions]
+
+    def skipped_lines(self) -> list[str]:
+        """A line for each skipped policy and its reason, with the conditions where not under all."""
         reasons: dict[tuple[str, str], list[str]] = {}
-        for condition, policies in self.left_out.items():
+        for condition, policies in self.skipped.items():
             for policy, reason in policies.items():
                 reasons.setdefault((policy, reason), []).append(condition)
         return [
@@ -113,17 +130,31 @@ class StudyResults(Headed):
         ]
 
     def save_csv(self, path: Path) -> None:
-        """Write ``study.csv``: a row a condition and policy, with the reason where it was left out."""
-        save_rows(list(self._rows()), path)
+        """Write ``study.csv``: a row a condition and policy, with the reason where it was skipped."""
+        import pandas as pd
 
-    def _rows(self) -> Iterator[Mapping[str, Any]]:
-        empty = dict.fromkeys(Summary.__dataclass_fields__)
+        rows = []
         for condition in self.conditions:
+            summaries, skipped = self.summaries.get(condition, {}), self.skipped.get(condition, {})
             for policy in self.policies:
-                found = self.summaries.get(condition, {}).get(policy)
-                numbers = empty if found is None else to_dict(found)
-                reason = self.left_out.get(condition, {}).get(policy)
-                yield {"condition": condition, "policy": policy, **numbers, "left_out": reason}
+                numbers = summaries[policy].row if policy in summaries else {}
+                reason = skipped.get(policy)
+                rows.append({"condition": condition, "policy": policy, **numbers, "skipped": reason})
+        save_frame(pd.DataFrame(rows), path)
+
+    @classmethod
+    def upgrade(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Version 1 named each metric of a summary as a field."""
+        for policies in values["summaries"].values() if values["schema"] == 1 else ():
+            for name, old in policies.items():
+                policies[name] = {
+                    "normalized_score": old.pop("share"),
+                    "perceived_normalized_score": old.pop("perceived_share"),
+                    "ratio": old.pop("ratio"),
+                    "most_limited": old.pop("most_limited"),
+                    "metrics": old,
+                }
+        return values
 
 
 def common_maneuvers(metrics: Mapping[str, Mapping[str, Mapping[str, Metrics]]]) -> tuple[str, ...]:
@@ -139,50 +170,32 @@ def summarize(
 
     Args:
         metrics: By condition, policy and maneuver; the first condition is what others are compared with.
-        criteria: For the references of the share.
+        criteria: For the references of the score.
     """
     common = common_maneuvers(metrics)
     if not common:
         return {}
+    references = (criteria or Criteria()).references
     nominal: dict[str, float] = {}
-    found: dict[str, dict[str, Summary]] = {}
+    summaries: dict[str, dict[str, Summary]] = {}
     for i, (condition, policies) in enumerate(metrics.items()):
-        chosen = {name: [drives[m] for m in common] for name, drives in policies.items() if drives}
-        errors = {name: _mean([m.cue_error for m in drives]) for name, drives in chosen.items()}
+        drives = {name: [each[m] for m in common] for name, each in policies.items() if each}
+        combined = {name: over_drives(each) for name, each in drives.items()}
+        errors = {name: each["cue_error"] or 0.0 for name, each in combined.items()}
+        perceived = {name: each["perceived_cue_error"] or 0.0 for name, each in combined.items()}
         nominal = errors if i == 0 else nominal
-        found[condition] = _condition(chosen, errors, nominal, criteria or Criteria())
-    return found
-
-
-def _condition(
-    drives: Mapping[str, list[Metrics]],
-    errors: Mapping[str, float],
-    nominal: Mapping[str, float],
-    criteria: Criteria,
-) -> dict[str, Summary]:
-    perceived = {name: _mean([m.perceived_cue_error for m in each]) for name, each in drives.items()}
-    gap = shares(errors, perceived, criteria.references)
-    return {
-        name: Summary(
-            cue_error=errors[name],
-            perceived_cue_error=perceived[name],
-            share=gap[name].cue_error,
-            perceived_share=gap[name].perceived_cue_error,
-            ratio=errors[name] / nominal[name] if nominal.get(name) else None,
-            false_cues=_mean([m.false_cues for m in each]),
-            tilt_rate_peak=max(m.tilt_rate_peak for m in each),
-            at_limit=_mean([m.at_limit for m in each]),
-            most_limited=max(m.at_limit for m in each),
-        )
-        for name, each in drives.items()
-    }
-
-
-def _mean(values: list[float]) -> float:
-    return sum(values) / len(values)
-
-
-# The tables of a study.
+        scores = normalized_scores(errors, perceived, references)
+        summaries[condition] = {
+            name: Summary(
+                metrics=combined[name],
+                normalized_score=scores[name].cue_error,
+                perceived_normalized_score=scores[name].perceived_cue_error,
+                ratio=errors[name] / nominal[name] if nominal.get(name) else None,
+                most_limited=max(m.at_limit for m in each),
+            )
+            for name, each in drives.items()
+        }
+    return summaries
 
 
 def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
@@ -195,92 +208,67 @@ def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
     """
     rows = []
     for policy in results.driven:
-        cells = [_cell(results, condition, policy, ratios) for condition in results.conditions]
+        cells = []
+        for i, (condition, summary) in enumerate(
+            zip(results.conditions, results.across(policy), strict=True)
+        ):
+            if summary is None:
+                cells.append("skipped" if policy in results.skipped.get(condition, {}) else NOTHING)
+            elif not ratios or i == 0 or summary.ratio is None:
+                cells.append(number(summary.cue_error))
+            else:
+                cells.append(f"{number(summary.cue_error)} (×{summary.ratio:.2f})")
         rows.append((policy, *cells))
     about = f"{title}: J, mean over {how_many(len(results.maneuvers), 'drive')}"
     return TextTable(about, ("policy", *results.conditions), tuple(rows))
 
 
-def _cell(results: StudyResults, condition: str, policy: str, ratios: bool) -> str:
-    found = results.summaries.get(condition, {}).get(policy)
-    if found is None:
-        return "left out" if policy in results.left_out.get(condition, {}) else NOTHING
-    first = condition == next(iter(results.conditions))
-    if not ratios or first or found.ratio is None:
-        return number(found.cue_error)
-    return f"{number(found.cue_error)} (×{found.ratio:.2f})"
+def score_tables(results: StudyResults) -> list[TextTable]:
+    """Normalized score of every policy under every condition, of J and of the perceived J, if there is any.
 
-
-def share_tables(results: StudyResults) -> list[TextTable]:
-    """Share of the gap of every policy under every condition, of J and of the perceived J, if there is any.
-
-    A share is of the gap under its own condition.
+    A score is measured between the references under its own condition.
     """
-    kinds = (("Share of the gap", False), ("Perceived share of the gap", True))
-    made = [_share_table(results, title, perceived) for title, perceived in kinds]
-    return [table for table in made if any(set(row[1:]) != {NOTHING} for row in table.rows)]
-
-
-def _share_table(results: StudyResults, title: str, perceived: bool) -> TextTable:
-    rows = []
-    for policy in results.driven:
-        found = [results.summaries.get(condition, {}).get(policy) for condition in results.conditions]
-        shares = [None if s is None else s.perceived_share if perceived else s.share for s in found]
-        rows.append((policy, *(fraction(share) for share in shares)))
-    return TextTable(title, ("policy", *results.conditions), tuple(rows))
+    tables = []
+    for name, title in SCORES.items():
+        rows = []
+        for policy in results.driven:
+            scores = [None if s is None else s.row[name] for s in results.across(policy)]
+            rows.append((policy, *map(fraction, scores)))
+        if any(set(row[1:]) != {NOTHING} for row in rows):
+            tables.append(TextTable(title.capitalize(), ("policy", *results.conditions), tuple(rows)))
+    return tables
 
 
 def condition_table(results: StudyResults, condition: str) -> TextTable:
-    """Every policy under one condition, best first; those left out are missing."""
-    found = results.summaries.get(condition, {})
-    gaps = {name: Share(s.share, s.perceived_share) for name, s in found.items()}
-    shown = has_shares(gaps.values())
-    order = sorted(found, key=lambda name: found[name].cue_error)
-    header = (
-        "policy",
-        "J",
-        "perceived J",
-        *(SHARE_HEADER if shown else ()),
-        f"J over {next(iter(results.conditions))}",
-        "false cues %",
-        "tilt rate peak deg/s",
-        "at a limit %",
-        "worst drive %",
-    )
-    rows = (_row(name, found[name], share_cells(gaps[name]) if shown else ()) for name in order)
-    title = f"{condition}: {results.conditions[condition]}"
-    return TextTable(title, header, tuple(rows), (0,) if order else ())
+    """Every policy under one condition, best first; skipped ones are missing."""
+    import pandas as pd
 
-
-def _row(name: str, s: Summary, shares: tuple[str, ...]) -> tuple[str, ...]:
-    return (
-        name,
-        number(s.cue_error),
-        number(s.perceived_cue_error),
-        *shares,
-        NOTHING if s.ratio is None else f"{s.ratio:.2f}",
-        percent(s.false_cues),
-        degrees(s.tilt_rate_peak),
-        percent(s.at_limit),
-        percent(s.most_limited),
-    )
+    summaries = results.summaries.get(condition, {})
+    order = sorted(summaries, key=lambda name: summaries[name].cue_error)
+    columns = ["policy", *METRICS, *SCORES, "ratio", "most_limited"]
+    rows = pd.DataFrame([{"policy": name, **summaries[name].row} for name in order], columns=columns)
+    more: dict[str, Cell] = {
+        f"J over {next(iter(results.conditions))}": lambda row: fraction(row["ratio"]),
+        "worst drive at a limit %": lambda row: percent(row["most_limited"]),
+    }
+    return policy_table(f"{condition}: {results.conditions[condition]}", rows, "study", more)
 
 
 def print_study(console: Console, results: StudyResults, title: str, ratios: bool) -> None:
-    """Show a table a condition, the matrices of J and shares, and what was counted, left out or failed."""
+    """Show a table a condition, the matrices of J and scores, counts, skipped policies and failures."""
     for condition in results.conditions:
         print_table(console, condition_table(results, condition))
-    for table in (matrix_table(results, title, ratios), *share_tables(results)):
+    for table in (matrix_table(results, title, ratios), *score_tables(results)):
         print_table(console, table)
     counted = [
-        (policy, f"{condition} {maneuver}", found)
+        (policy, f"{condition} {maneuver}", counts)
         for condition, policies in results.notes.items()
         for policy, drives in policies.items()
-        for maneuver, found in drives.items()
+        for maneuver, counts in drives.items()
     ]
     print_troubles(console, counted)
-    for line in results.told_left_out():
-        console.print(f"[bold]left out[/bold] {escape(line)}", highlight=False)
+    for line in results.skipped_lines():
+        console.print(f"[bold]skipped[/bold] {escape(line)}", highlight=False)
     for failure in results.failures:
         who = ", ".join(part for part in (failure.condition, failure.policy, failure.maneuver) if part)
         console.print(

@@ -12,10 +12,10 @@ from ...envs.car import Car
 from ...envs.cues import CueTrace
 from ...envs.errors import DataError
 from ...envs.platform import Platform
+from ...envs.provenance import package_version
 from ...envs.settings import configuration, from_dict, to_dict
 from ...envs.storage import write_text
 from ..metrics import Metrics
-from ..provenance import package_version
 from ..reporting.text import plain_name
 
 _FOLDER: Final = "pairs"

@@ -89,9 +89,9 @@ def test_evaluate_writes_everything(simulator, cue_file, tmp_path, capsys):
         "results.csv",
         "report.html",
         "bend.png",
-        "ladder.csv",
-        "ladder.md",
-        "ladder.png",
+        "benchmark.csv",
+        "benchmark.md",
+        "benchmark.png",
         "trajectories",
     }
     results = Results.load_json(out / "results.json")

@@ -10,7 +10,7 @@ from rich.console import Console
 from motion_cueing.evaluation.reporting.tables import print_results
 from motion_cueing.evaluation.suite import trouble_lines
 
-from .test_ladder import GAINS, results_of
+from .examples import GAINS, results_of
 
 
 def mpc(solves=100, failures=0, relaxed=0):

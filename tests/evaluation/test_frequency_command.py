@@ -63,7 +63,7 @@ class Tired:
 def ladder(monkeypatch):
     """A ladder of three: one that can be tested, one that knows its drives alone, one that fails."""
     monkeypatch.setattr(
-        "motion_cueing.evaluation.selection.ladder_names",
+        "motion_cueing.evaluation.selection.benchmark_policies",
         lambda known: ["no-motion", "classical-per-maneuver", "adaptive"],
     )
     made = policies.make_policy
@@ -73,7 +73,7 @@ def ladder(monkeypatch):
 
 
 def test_the_ladder_leaves_out_what_knows_no_sinusoids_and_goes_on_after_a_failure(ladder, tmp_path, capsys):
-    assert main([*quick("ladder"), "--out", str(tmp_path)]) == 1
+    assert main([*quick("benchmark"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
     assert (
         "left out classical-per-maneuver: classical-per-maneuver has a set for each standard maneuver"

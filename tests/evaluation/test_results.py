@@ -1,22 +1,18 @@
-"""results.json, results.csv, report.html and the figures."""
+"""results.json and results.csv, of this version and of the one before."""
 
 from __future__ import annotations
 
 import csv
 import json
-import re
-import struct
+from pathlib import Path
 
 import pytest
 
+from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation.metrics import CUE_AXES, measure
-from motion_cueing.evaluation.provenance import plain, provenance
-from motion_cueing.evaluation.reporting.figures import maneuver_figure
-from motion_cueing.evaluation.reporting.report import render
-from motion_cueing.evaluation.reporting.tables import maneuver_table
-from motion_cueing.evaluation.reporting.text import number
-from motion_cueing.evaluation.results import SCHEMA, Failure, Results
+from motion_cueing.evaluation.results import SCHEMA, Failure, Provenance, Results, save_rows
 
 from .synthetic import drive
 
@@ -24,10 +20,10 @@ from .synthetic import drive
 @pytest.fixture(scope="module")
 def results() -> Results:
     drives = {"washout": measure(drive()), "no-motion": measure(drive(gain=0.0))}
-    origin = provenance(
+    origin = Provenance.of(
         ["motion-cueing", "evaluate", "--policy", "a b"],
-        ("base", {"stroke": 0.67}),
-        ("sedan", {"mass": 1814.0}),
+        get_platform("paper"),
+        get_car("sedan"),
         {"washout": {"parameters": '{"gain": 1}'}},
     )
     failures = [Failure("hill", "washout", "no <b>road</b>")]
@@ -49,16 +45,21 @@ def test_json_is_strict_and_documented(results, tmp_path):
         "provenance",
         "maneuvers",
         "verdicts",
-        "standings",
         "failures",
         "criteria",
-        "shares",
-        "left_out",
+        "scores",
+        "normalized_scores",
+        "skipped",
         "notes",
     ]
     assert values["maneuvers"]["weave"]["no-motion"]["axes"]["f_y"]["correlation"] is None
     assert list(values["maneuvers"]["weave"]["washout"]["axes"]) == list(CUE_AXES)
     assert values["provenance"]["command"] == "motion-cueing evaluate --policy 'a b'"
+    assert (
+        values["provenance"]["platform"]
+        == values["provenance"]["configuration"]["platform"]["name"]
+        == "paper"
+    )
     assert values["provenance"]["configuration"]["policies"]["washout"]["parameters"] == {"gain": 1}
     assert {"python", "numpy", "motion-cueing-gym"} <= set(values["provenance"]["versions"])
     assert values["failures"] == [{"maneuver": "hill", "policy": "washout", "message": "no <b>road</b>"}]
@@ -103,48 +104,50 @@ def test_csv_without_a_drive_has_a_header(results, tmp_path):
     empty.save_csv(tmp_path / "results.csv")
     assert (tmp_path / "results.csv").read_text() == "maneuver,policy\n"
     assert empty.overall is None
-    assert "Configuration" in render(empty, {})
+    assert empty.frame().empty
 
 
-def test_the_report_is_self_contained_and_escapes(results):
-    page = render(results, {"weave": b"\x89PNG"})
-    assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", page)
-    assert "http://" not in page
-    assert "https://" not in page
-    assert "data:image/png;base64,iVBORw==" in page
-    assert "no &lt;b&gt;road&lt;/b&gt;" in page
-    for text in ("weave", "washout", "no-motion", "mass: 1814.0", "indifference_force", "--policy"):
-        assert text in page
+def test_a_frame_has_the_drives_with_their_scores(results):
+    frame = results.frame()
+    assert frame[["maneuver", "policy"]].to_numpy().tolist() == [["weave", "washout"], ["weave", "no-motion"]]
+    means = frame.groupby("policy")["axes.f_y.rmse"].mean()
+    assert means["washout"] == results.maneuvers["weave"]["washout"].axes["f_y"].rmse
+    assert frame["normalized_score"].isna().all()
 
 
-def test_plain_keeps_json_and_drops_what_is_not_finite():
-    assert plain({"a": (1, 2.5, float("inf")), "b": None, "c": "[1, 2]", "d": "{no json"}) == {
-        "a": [1, 2.5, None],
-        "b": None,
-        "c": [1, 2],
-        "d": "{no json",
-    }
+def test_rows_keep_whole_numbers_and_empty_cells(tmp_path):
+    rows = [{"name": "a, b", "count": 3, "value": 0.1}, {"name": "c", "count": None, "value": 1 / 3}]
+    save_rows(rows, tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_text() == ('name,count,value\n"a, b",3,0.1\nc,,0.3333333333333333\n')
+    save_rows([], tmp_path / "none.csv", ("a", "b"))
+    assert (tmp_path / "none.csv").read_text() == "a,b\n"
 
 
-def test_the_table_lists_the_best_first(results):
-    table = maneuver_table("weave", results.maneuvers["weave"])
-    assert [row[0] for row in table.rows] == ["washout", "no-motion"]
-    assert all(len(row) == len(table.header) for row in table.rows)
+BEFORE = Path(__file__).parent / "before" / "results-1.json"
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(None, "–"), (0.0, "0.00"), (1.2345, "1.23"), (12.345, "12.3"), (123.4, "123"), (0.012345, "0.012")],
-)
-def test_numbers_have_three_digits(value, text):
-    assert number(value) == text
+def test_results_of_the_version_before_are_read(tmp_path):
+    old, results = json.loads(BEFORE.read_text()), Results.load_json(BEFORE)
+    assert (old["schema"], results.schema) == (1, SCHEMA)
+    assert [(s.policy, s.normalized_score) for s in results.scores] == [
+        (s["policy"], s["share"]) for s in old["standings"]
+    ]
+    score = results.normalized_scores["braking"]["mpc"]
+    assert score.perceived_cue_error == old["shares"]["braking"]["mpc"]["perceived_cue_error"]
+    assert results.skipped == {"learned-any": "needs a turntable"}
+    assert results.failures == (Failure("hill", "mpc", "stopped"),)
+    results.save_json(tmp_path / "results.json")
+    assert Results.load_json(tmp_path / "results.json") == results
+    assert json.loads((tmp_path / "results.json").read_text())["maneuvers"] == old["maneuvers"]
 
 
-def test_a_figure_is_a_png_and_leaves_no_global_state():
-    import matplotlib as mpl
-
-    before = dict(mpl.rcParams)
-    image = maneuver_figure({"washout": drive(), "no-motion": drive(gain=0.0, policy="no-motion")})
-    assert image.startswith(b"\x89PNG\r\n\x1a\n")
-    assert struct.unpack(">II", image[16:24]) == (1430, 1540)
-    assert dict(mpl.rcParams) == before
+def test_policies_of_the_version_before_are_judged_alike():
+    results = Results.load_json(BEFORE)
+    again = Results.of(results.maneuvers, [], results.provenance, results.criteria)
+    alone = {verdict.maneuver: verdict for verdict in results.verdicts}
+    for maneuver, scores in again.normalized_scores.items():
+        for policy, score in scores.items():
+            assert score.cue_error == results.normalized_scores[maneuver][policy].cue_error
+        assert again.verdicts[0].ranking == tuple(
+            name for name in alone["braking"].ranking if name in results.maneuvers["braking"]
+        )

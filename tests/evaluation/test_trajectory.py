@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,3 +126,19 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
         trajectory(policy="new").save(path)
     assert Trajectory.load(path).policy == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["drive.npz"]
+
+
+def test_a_file_of_the_version_before_is_read(tmp_path):
+    """Its arrays are called f_wanted, f_felt, sensed_f_felt and so on."""
+    path = Path(__file__).parent / "before" / "lane-change--classical-1.npz"
+    old, drive = np.load(path), Trajectory.load(path)
+    for now, before in (
+        ("f_reference", "f_wanted"), ("w_simulator", "w_felt"), ("head_f_reference", "head_f_wanted"),
+        ("perceived_f_simulator", "sensed_f_felt"), ("perceived_w_reference", "sensed_w_wanted"),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(getattr(drive, now), old[before])
+    assert np.abs(drive.f_reference - drive.f_simulator).max() > 0.1
+    drive.save(tmp_path / "now.npz")
+    again = Trajectory.load(tmp_path / "now.npz")
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(again, name), getattr(drive, name))

@@ -13,8 +13,7 @@ import pytest
 from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions, RewardOptions, RewardWeights
 from motion_cueing.envs.task.kernels import reward as reward_page
 from motion_cueing.envs.task.reward import DECLARED, TERMS
-from motion_cueing.evaluation import signals
-from motion_cueing.evaluation.metrics import Criteria
+from motion_cueing.evaluation.metrics import Criteria, beyond, false_cues
 
 from .tasks import drive
 
@@ -31,15 +30,15 @@ def expected_terms(env: DrivingSimulator, action: np.ndarray, before: np.ndarray
     state = env.batch.simulator.state[0]
     wanted, felt = six(state["reference_cue"]), six(state["simulator_cue"])
     sensed = six(state["perceived_simulator"]) - six(state["perceived_reference"])
-    error = ((felt - wanted) / np.array(C.scales)) ** 2
-    false = [signals.false_cues(wanted[i : i + 1], felt[i : i + 1], C.thresholds[i])[0] for i in range(6)]
-    extra = signals.beyond(wanted[3:5], felt[3:5])
+    error = ((felt - wanted) / np.array(C.indifference_zone)) ** 2
+    false = [false_cues(wanted[i : i + 1], felt[i : i + 1], C.thresholds[i])[0] for i in range(6)]
+    extra = beyond(wanted[3:5], felt[3:5])
     position = state["motion"]["position"]
     use = np.abs(position[:8]) / np.array([13.72] * 2 + [0.67] * 6)
     active = [(int(state["limits"]) >> (4 * k)) & 15 for k in range(9)]
     return {
         "cue_error": float(error.sum()),
-        "perceived_error": float(np.sum((sensed / np.array(C.scales)) ** 2)),
+        "perceived_error": float(np.sum((sensed / np.array(C.indifference_zone)) ** 2)),
         "false_cues": float(error[false].sum()),
         "tilt_rate": max(math.hypot(*extra) / C.tilt_rate - 1.0, 0.0) ** 2,
         "stroke": float(np.sum(np.maximum((use - 0.8) / 0.2, 0.0) ** 2)),

@@ -1,12 +1,22 @@
-"""The verdict names the better policy, the margin and the reason, checked on drives built to have them."""
+"""The normalized score, and the verdict: the better policy, the margin and the reason."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from motion_cueing.evaluation.comparison import advantage, judge, judge_suite, terms
-from motion_cueing.evaluation.metrics import measure
+from motion_cueing.evaluation.comparison import (
+    NormalizedScore,
+    advantage,
+    judge,
+    judge_suite,
+    normalized_score,
+    normalized_scores,
+    terms,
+)
+from motion_cueing.evaluation.metrics import References, measure
 
 from .synthetic import GRAVITY, drive, trajectory
 
@@ -17,8 +27,8 @@ LATE = measure(drive(gain=0.9, lag=0.4))
 
 def push(y: float):
     """A car pushed by 1 m/s^2 to the right, the simulator by ``y``."""
-    wanted, felt = np.tile([0.0, 1.0, -GRAVITY], (201, 1)), np.tile([0.0, y, -GRAVITY], (201, 1))
-    return measure(trajectory(f_reference=wanted, f_simulator=felt))
+    reference, simulated = (np.tile([0.0, side, -GRAVITY], (201, 1)) for side in (1.0, y))
+    return measure(trajectory(f_reference=reference, f_simulator=simulated))
 
 
 def test_terms_add_up_to_the_cue_error():
@@ -53,7 +63,11 @@ def test_the_axis_on_which_the_best_is_worse_is_named():
     gain = (2.0 / 0.6) ** 2
     assert (why.axis, why.cause, why.worse_axis, why.worse_cause) == ("f_y", "missing", "w_x", "false")
     assert why.axis_share == pytest.approx(gain / (gain - loss))
-    assert "worse of the two on w_x" in " ".join(judge("t", {"no-motion": still, "a": tilting}).sentences)
+    assert judge("t", {"no-motion": still, "a": tilting}).sentences == [
+        "a is best: J = 1.79.",
+        "Its J is 84% lower than that of no-motion (11.1). It gains most on f_y (11.1): fewer missing cues. "
+        "It is worse on w_x: false cues.",
+    ]
 
 
 def test_equal_policies_are_level():
@@ -61,7 +75,7 @@ def test_equal_policies_are_level():
     assert verdict.ranking == ("a", "b")
     assert verdict.advantages[0].margin == 0.0
     assert verdict.advantages[0].axis is None
-    assert "level" in verdict.sentences[1]
+    assert verdict.sentences[1] == f"b has the same J ({GOOD.cue_error:.3g})."
 
 
 def test_one_policy_alone_has_no_advantage():
@@ -84,7 +98,7 @@ def test_the_perceived_best_is_named_where_it_differs():
 
 
 def test_the_suite_averages_only_what_every_policy_finished():
-    verdict, standings = judge_suite(
+    verdict, scores = judge_suite(
         {
             "weave": {"good": GOOD, "no-motion": STILL},
             "again": {"good": LATE, "no-motion": STILL},
@@ -93,13 +107,43 @@ def test_the_suite_averages_only_what_every_policy_finished():
     )
     assert verdict is not None
     assert verdict.maneuver == "all"
-    assert [s.policy for s in standings] == ["good", "no-motion"]
-    assert standings[0].cue_error == pytest.approx((GOOD.cue_error + LATE.cue_error) / 2)
-    assert verdict.cue_error == pytest.approx(standings[0].cue_error)
-    assert (standings[0].wins, standings[0].maneuvers, standings[0].worst_maneuver) == (2, 2, "again")
-    assert standings[1].wins == 0
+    assert [s.policy for s in scores] == ["good", "no-motion"]
+    assert scores[0].cue_error == pytest.approx((GOOD.cue_error + LATE.cue_error) / 2)
+    assert verdict.cue_error == pytest.approx(scores[0].cue_error)
+    assert (scores[0].wins, scores[0].maneuvers, scores[0].worst_maneuver) == (2, 2, "again")
+    assert scores[1].wins == 0
 
 
 def test_a_suite_without_a_common_maneuver_has_no_verdict():
     assert judge_suite({"a": {"x": GOOD}, "b": {"y": GOOD}}) == (None, [])
     assert judge_suite({}) == (None, [])
+
+
+J = st.floats(0.0, 1e3)
+
+
+@given(J, J, J)
+def test_the_score_is_0_at_the_baseline_and_1_at_the_optimum_and_linear_between(value, baseline, optimum):
+    score = normalized_score(value, baseline, optimum)
+    if baseline <= optimum:
+        assert score is None
+        return
+    assert normalized_score(baseline, baseline, optimum) == 0.0
+    assert normalized_score(optimum, baseline, optimum) == 1.0
+    assert baseline - score * (baseline - optimum) == pytest.approx(value, abs=1e-9 * max(baseline, value))
+
+
+@pytest.mark.parametrize(("baseline", "optimum"), [(None, 1.0), (2.0, None), (None, None), (1.0, 1.0)])
+def test_without_a_gap_there_is_no_score(baseline, optimum):
+    assert normalized_score(0.5, baseline, optimum) is None
+
+
+def test_j_and_the_perceived_j_have_optima_of_their_own():
+    found = normalized_scores(
+        {"classical-tuned": 4.0, "mpc": 2.0, "optimum": 1.0, "optimum-perceived": 1.5},
+        {"classical-tuned": 8.0, "mpc": 5.0, "optimum": 3.0, "optimum-perceived": 2.0},
+        References(),
+    )
+    assert found["mpc"] == NormalizedScore(2.0 / 3.0, 0.5)
+    assert found["optimum-perceived"].perceived_cue_error == 1.0
+    assert found["optimum-perceived"].cue_error == pytest.approx(2.5 / 3.0)

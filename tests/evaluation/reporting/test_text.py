@@ -13,11 +13,16 @@ from rich.console import Console
 from motion_cueing.evaluation.reporting.text import (
     NOTHING,
     TextTable,
+    degrees,
+    fraction,
     how_many,
     markdown,
+    microseconds,
     number,
+    percent,
     print_table,
     save_markdown,
+    seconds,
     table_console,
 )
 
@@ -72,9 +77,9 @@ def test_a_pipe_has_room_for_every_table(capsys):
 
 def test_markdown_has_lines_below_the_table_and_titles_above_several(tmp_path):
     table = TextTable("A title", ("policy", "J"), (("a|b", "1"),), (0,))
-    save_markdown(tmp_path / "one.md", table, "Left out: mine: no solver")
+    save_markdown(tmp_path / "one.md", table, "Skipped: mine: no solver")
     lines = (tmp_path / "one.md").read_text().splitlines()
-    assert lines == ["| policy | J |", "|---|---|", "| **a\\|b** | **1** |", "", "Left out: mine: no solver"]
+    assert lines == ["| policy | J |", "|---|---|", "| **a\\|b** | **1** |", "", "Skipped: mine: no solver"]
     save_markdown(tmp_path / "two.md", table, table)
     once = f"**A title**\n\n{markdown(table)}\n"
     assert (tmp_path / "two.md").read_text() == f"{once}\n{once}"
@@ -88,3 +93,16 @@ def test_numbers_and_their_nouns():
     )
     assert number(float("nan")) == number(None) == NOTHING
     assert (number(1e-6), number(0.0), number(12.345)) == ("1.00e-06", "0.00", "12.3")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "–"), (0.0, "0.00"), (1.2345, "1.23"), (12.345, "12.3"), (123.4, "123"), (0.012345, "0.012")],
+)
+def test_numbers_have_three_digits(value, text):
+    assert number(value) == text
+
+
+@pytest.mark.parametrize("text", [number, percent, degrees, fraction, seconds, microseconds])
+def test_what_is_undefined_is_a_dash(text):
+    assert text(None) == text(float("nan")) == NOTHING

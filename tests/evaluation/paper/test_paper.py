@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from motion_cueing.cli.main import main
-from motion_cueing.evaluation.paper.cases import CASES, drive_cases
+from motion_cueing.envs.settings import to_dict
+from motion_cueing.evaluation.paper.cases import CASES, PaperResults, drive_cases, paper_figures, run
 from motion_cueing.evaluation.paper.statements import Check, all_checks, within_limits
 from motion_cueing.evaluation.trajectory import Trajectory
 
@@ -56,14 +58,51 @@ def test_bounds_are_inclusive_and_two_sided():
     assert not Check(measured=2.001, **values).passed
 
 
-def test_the_command_writes_table_figures_and_page(tmp_path, capsys):
-    assert main(["evaluate", "--paper", "--out", str(tmp_path)]) == 0
+def test_the_figures_show_the_drives(drives):
+    figures = {caption.split(":")[0]: figure for caption, figure in paper_figures(drives).items()}
+    assert sorted(figures) == [f"Figure {number}" for number in range(5, 10)]
+    shown = {
+        "Figure 5": (1, "EST1", "EST2", "EST3"),
+        "Figure 8": (0, "BRK"),
+        "Figure 9": (1, "LC1", "LC2"),
+    }
+    for name, (axis, *cases) in shown.items():
+        curves = {line.get_label(): line.get_ydata() for line in figures[name].axes[0].lines}
+        assert set(curves) == {"car", *cases}
+        np.testing.assert_array_equal(curves["car"], drives[cases[0]].f_reference[:, axis])
+        for case in cases:
+            np.testing.assert_array_equal(curves[case], drives[case].f_simulator[:, axis])
+    for axes, case in zip(figures["Figure 6"].axes, ("EST1", "EST2", "EST3"), strict=True):
+        np.testing.assert_array_equal(axes.lines[0].get_xydata(), drives[case].carriage[:, ::-1])
+    upper, lower = figures["Figure 7"].axes
+    curves = {line.get_label(): line.get_ydata() for line in [*upper.lines, *lower.lines]}
+    for case in ("EST1", "EST2", "EST3"):
+        np.testing.assert_allclose(curves[case], np.degrees(drives[case].w_simulator[:, 2]))
+    second = drives["EST2"]
+    false = np.degrees(second.w_simulator[:, 2] - second.w_reference[:, 2])
+    np.testing.assert_allclose(curves["EST2 less car"], false)
+
+
+def test_the_file_of_the_version_before_is_read():
+    path = Path(__file__).parents[1] / "before" / "paper-1.json"
+    old, results = json.loads(path.read_text()), PaperResults.load_json(path)
+    assert [to_dict(check) for check in results.checks] == old["checks"]
+    assert results.versions == old["versions"]
+
+
+def test_a_run_writes_table_figures_and_page(tmp_path, capsys):
+    assert run(tmp_path) == 0
     said = capsys.readouterr().out
     assert "FAIL" not in said
     record = json.loads((tmp_path / "paper.json").read_text())
     assert all(check["passed"] for check in record["checks"])
+    assert PaperResults.load_json(tmp_path / "paper.json").checks == tuple(
+        Check(**{k: v for k, v in check.items() if k != "passed"}) for check in record["checks"]
+    )
     for number in range(5, 10):
-        assert (tmp_path / f"figure-{number}.png").read_bytes().startswith(b"\x89PNG")
+        picture = np.asarray(Image.open(tmp_path / f"figure-{number}.png").convert("L"))
+        assert picture.shape[1] > 800
+        assert (picture < 128).mean() > 0.005
     page = (tmp_path / "paper.html").read_text()
     assert page.count("data:image/png;base64,") == 5
     assert 'src="http' not in page
