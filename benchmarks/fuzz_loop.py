@@ -24,7 +24,7 @@ from motion_cueing.realtime.controller import Controller, ControllerOptions
 from motion_cueing.realtime.inbox import Inbox
 from motion_cueing.realtime.machine import make_machine
 from motion_cueing.realtime.packets import Cues, Format, make_format
-from motion_cueing.realtime.watchdog import Patience
+from motion_cueing.realtime.watchdog import WatchdogOptions
 
 RATE = 1000
 WILD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0.0, -0.0, 1e3, -1e3, 100.0, 1e6)
@@ -109,10 +109,10 @@ def moments(count: int, random: np.random.Generator) -> Iterator[int]:
 
 def run(policy: str, form: Format, count: int, seed: int) -> int:
     """Feed a controller; returns the set-points outside of the limits."""
-    platform, patience = get_platform("paper"), Patience()
+    platform, options = get_platform("paper"), WatchdogOptions()
     machine = make_machine(make_policy(policy, platform), platform)
-    inbox = Inbox(form, patience.stale, patience.overdue)
-    controller = Controller(machine, platform, inbox, ControllerOptions(rate=RATE, patience=patience))
+    inbox = Inbox(form, options.stale, options.overdue)
+    controller = Controller(machine, platform, inbox, ControllerOptions(rate=RATE, watchdog=options))
     sender, check = Sender(form, seed), LimitCheck(platform, RATE)
     states: Counter[str] = Counter()
     outside, begin = 0, time.perf_counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 import zlib
 
 import msgpack
@@ -13,7 +14,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.realtime import packets as message_pack
 from motion_cueing.realtime.packets import MOTION, MOTION_SIZE, Cues, FloatsFormat, SetPoint, make_format
 from motion_cueing.realtime.watchdog import State
 
@@ -106,10 +106,6 @@ def test_what_is_wrong_is_told(change, told):
 def test_unknown_formats_and_missing_libraries_are_told(monkeypatch):
     with pytest.raises(UnknownNameError, match="Did you mean floats"):
         make_format("float")
-
-    def missing(name):
-        raise ImportError(name)
-
-    monkeypatch.setattr(message_pack, "import_module", missing)
+    monkeypatch.setitem(sys.modules, "msgpack", None)
     with pytest.raises(ConfigurationError, match=r"motion-cueing-gym\[loop\]"):
         make_format("msgpack")
