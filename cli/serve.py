@@ -19,7 +19,7 @@ from ..envs.storage import check_file
 from ..evaluation.reporting.text import words_of
 from ..evaluation.selection import find_platform
 from ..realtime.controller import Controller, ControllerOptions
-from ..realtime.inbox import Inbox
+from ..realtime.inbox import CueBounds, Inbox
 from ..realtime.machine import LiveMachine, make_machine
 from ..realtime.packets import make_format
 from ..realtime.report import LoopReport, report_of, show
@@ -66,6 +66,10 @@ class ServeCommand:
     """How long cues must have come without a gap before the policy begins, s."""
     fade: float = WatchdogOptions().fade
     """Time in which the cues come in then, s."""
+    max_force: float = 1000.0
+    """Largest plausible specific force on an axis, m/s^2; packets beyond it are not used."""
+    max_angular_velocity: float = 100.0
+    """Largest plausible angular velocity about an axis, rad/s."""
     lead: float = 0.001
     """Time before its first set-point at which a step of 10 ms is decided, s; at most a period."""
     cpu: int | None = None
@@ -124,7 +128,8 @@ def _made(command: ServeCommand) -> _Served:
     watchdog = WatchdogOptions(command.overdue, command.hold, command.stale, command.steady, command.fade)
     options = ControllerOptions(rate=command.rate, watchdog=watchdog)
     peer = address_of(command.peer, 0) if command.peer else None
-    inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer)
+    bounds = CueBounds(command.max_force, command.max_angular_velocity)
+    inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)
     platform = find_platform(command.platform)
     policy = make_policy(command.policy, platform)
     machine = make_machine(policy, platform, _VESTIBULAR)

@@ -161,7 +161,7 @@ class Controller:
         self._motions: Floats = np.zeros((0, 0))
         self._echo = (NO_SEQUENCE, 0.0, 0.0)
         self._stopping = self._decided = False
-        self._began = -1
+        self._faded = 0
 
     @property
     def decides(self) -> bool:
@@ -204,7 +204,7 @@ class Controller:
             self.inbox.reset()
         begins = self.state.follows and not before.follows
         if begins:
-            self._began = len(self.log)
+            self._faded = 0
         begin = machine.motion
         try:
             machine.catch_up(self._cues())
@@ -234,11 +234,18 @@ class Controller:
         self.state = State.BRAKING
 
     def _cues(self) -> Floats:
-        """(6,) cues for the policy: of a standing car unless it acts, faded in when it begins."""
-        newest = self.inbox.newest
+        """(6,) cues for the policy: of a standing car unless it acts.
+
+        They fade in when it begins and after a pause of the drive, and out when such a pause begins.
+        """
+        newest, fade = self.inbox.newest, self._options.fade
         if not self.state.follows or newest is None:
             return AT_REST
-        self._echo = newest.sequence, newest.time, self.inbox.arrival
-        elapsed = (len(self.log) - self._began) * TIME_STEP
-        share = min(elapsed / self._options.fade, 1.0) if self._options.fade > 0.0 else 1.0
+        if self.inbox.paused:
+            self._faded = max(min(self._faded, math.ceil(fade / TIME_STEP)) - 1, 0)
+            share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 0.0
+        else:
+            self._echo = newest.sequence, newest.time, self.inbox.arrival
+            share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 1.0
+            self._faded += 1
         return np.asarray(AT_REST + share * (np.array(newest.force + newest.rate) - AT_REST))

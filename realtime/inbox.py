@@ -6,11 +6,12 @@ kind         cause
 used         it is whole, new and in time
 malformed    size, magic, version or checksum are wrong
 not_finite   a NaN or an infinity
-implausible  beyond 1000 m/s^2 or 100 rad/s, or more than 10,000 numbers ahead
+implausible  beyond the bounds, 1000 m/s^2 and 100 rad/s, or more than 10,000 numbers ahead
 repeated     its number has arrived before
 late         overtaken by a packet with a higher number
 stale        delayed by more than ``stale`` beyond the quickest packet
 foreign      from another sender than the first, or than the named peer
+paused       the sender says that its drive is paused
 ===========  ==========================================================================================
 """
 
@@ -20,23 +21,49 @@ import math
 from typing import Final
 
 from ..envs.errors import DataError
+from ..envs.settings import Positive, configuration
 from .packets import Cues, Format
 
 Address = tuple[str, int]
 """Host and port."""
 
-KINDS: Final = ("used", "malformed", "not_finite", "implausible", "repeated", "late", "stale", "foreign")
+KINDS: Final = (
+    "used",
+    "malformed",
+    "not_finite",
+    "implausible",
+    "repeated",
+    "late",
+    "stale",
+    "foreign",
+    "paused",
+)
 
-_LARGEST_FORCE: Final = 1000.0
-"""More than any car reaches, m/s^2; the same for a file of cues."""
-_LARGEST_RATE: Final = 100.0
-"""More than any car reaches, rad/s."""
 _LARGEST_JUMP: Final = 10_000
 """Packets that may be lost in a row: 10 s at 1 kHz; the watchdog resets the filter after far less silence."""
 _DRIFT: Final = 1e-3
 """Relative drift of the two clocks that is tolerated."""
 _WINDOW: Final = 64
 """Numbers below the newest for which the window remembers whether they arrived."""
+
+
+@configuration
+class CueBounds:
+    """Bounds of plausible cues on each axis; packets beyond them are not used.
+
+    The defaults are those of a file of cues, more than any car reaches. Tires limit a road car to about
+    10 m/s^2: 30 m/s^2 and 5 rad/s let all of its drives pass, and stop most faults of a sender.
+
+    Args:
+        force: Largest specific force, m/s^2.
+        rate: Largest angular velocity, rad/s.
+    """
+
+    force: Positive = 1000.0
+    rate: Positive = 100.0
+
+
+ANY_CAR: Final = CueBounds()
 
 
 class SequenceWindow:
@@ -88,18 +115,28 @@ class Inbox:
         stale: Delay beyond the least one so far from which a packet is too old, s.
         gap: Longest time between packets without a gap, s.
         peer: The only sender to listen to, host and port; port 0 for any. None for whoever sends first.
+        bounds: Of plausible cues.
 
     Attributes:
         counts: Packets by kind, see :data:`KINDS`.
         newest: Cues in use.
-        arrival: When they arrived, s.
+        paused: Whether a pause was the last that the sender said.
+        arrival: When the newest cues, or the pause, arrived, s.
         sender: Of the newest cues.
     """
 
-    def __init__(self, form: Format, stale: float, gap: float, peer: Address | None = None) -> None:
-        self._form, self._stale, self._gap, self._peer = form, stale, gap, peer
+    def __init__(
+        self,
+        form: Format,
+        stale: float,
+        gap: float,
+        peer: Address | None = None,
+        bounds: CueBounds = ANY_CAR,
+    ) -> None:
+        self._form, self._stale, self._gap, self._peer, self._bounds = form, stale, gap, peer, bounds
         self.counts = dict.fromkeys(KINDS, 0)
         self.newest: Cues | None = None
+        self.paused = False
         self.arrival = -math.inf
         self.sender: Address | None = None
         self._since = self._last_checked = math.inf
@@ -145,9 +182,11 @@ class Inbox:
             cues = self._form.unpack_cues(data)
         except DataError:
             return "malformed"
-        if not all(map(math.isfinite, (cues.time, *cues.force, *cues.rate))):
+        # The numbers of a pause mean nothing, but for its time.
+        force, rate = ((0.0,), (0.0,)) if cues.paused else (cues.force, cues.rate)
+        if not all(map(math.isfinite, (cues.time, *force, *rate))):
             return "not_finite"
-        if max(map(abs, cues.force)) > _LARGEST_FORCE or max(map(abs, cues.rate)) > _LARGEST_RATE:
+        if max(map(abs, force)) > self._bounds.force or max(map(abs, rate)) > self._bounds.rate:
             return "implausible"
         kind = self._window.put(cues.sequence)
         if kind != "used":
@@ -159,5 +198,8 @@ class Inbox:
             return "stale"
         if not now - self.arrival <= self._gap:
             self._since = now
-        self.newest, self.arrival, self.sender, self._bound = cues, now, sender, sender
+        self.arrival, self.sender, self._bound, self.paused = now, sender, sender, cues.paused
+        if cues.paused:
+            return "paused"
+        self.newest = cues
         return "used"

@@ -3,20 +3,20 @@
 Axes: x forward, y right, z down. SI units and radians. Specific force is f = a - g: (0, 0, -9.81) in a car
 that stands. The plain format ("floats") is little-endian, and ends in the CRC-32 of zlib over all before it.
 
-Cues, version 1, 76 bytes:
+Cues, 76 bytes; a sender that knows no pause writes version 1:
 
-=====  =========  ===================================================================================
+=====  =========  ================================================================
 bytes  type       content
-=====  =========  ===================================================================================
+=====  =========  ================================================================
 0-3    4 bytes    ``MCGC``
-4-5    uint16     version, 1
-6-7    uint16     0
+4-5    uint16     version, 1 or 2
+6-7    uint16     flags: in version 2, bit 0 says that the drive is paused; else 0
 8-15   uint64     sequence: one more for each packet
 16-23  double     time of the sender's clock, s
 24-47  3 doubles  specific force at the cab's reference point of the car, m/s^2
 48-71  3 doubles  angular velocity of the car, rad/s
 72-75  uint32     CRC-32 of bytes 0-71
-=====  =========  ===================================================================================
+=====  =========  ================================================================
 
 Set-points, version 1, 364 bytes, for the end of the period that begins when they are sent:
 
@@ -41,8 +41,8 @@ bytes    type       content
 =======  =========  =================================================================================
 
 MessagePack ("msgpack") has the same content as maps. Cues: ``version``, ``sequence``, ``time``, ``force``,
-``rate``. Set-points: ``version``, ``state``, ``sequence``, ``echo``, ``echo_time``, ``received``, ``sent``,
-``position``, ``velocity``, ``acceleration``, ``legs``, ``leg_rates``.
+``rate``; in version 2 ``paused``, a boolean. Set-points: ``version``, ``state``, ``sequence``, ``echo``,
+``echo_time``, ``received``, ``sent``, ``position``, ``velocity``, ``acceleration``, ``legs``, ``leg_rates``.
 """
 
 from __future__ import annotations
@@ -61,7 +61,12 @@ Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 VERSION: Final = 1
-"""Of both packets; a reader refuses others."""
+"""Of set-points, and of cues without flags; a reader refuses unknown versions."""
+
+FLAGS_VERSION: Final = 2
+"""Of cues with flags."""
+
+_PAUSED: Final = 1
 
 LARGEST: Final = 2048
 """Longest datagram that is read, bytes."""
@@ -89,12 +94,14 @@ class Cues(NamedTuple):
         time: Of the sender's clock, s.
         force: Specific force f = a - g at the cab's reference point of the car, m/s^2.
         rate: Angular velocity of the car, rad/s.
+        paused: Whether the drive is paused: force and rate mean nothing, as in the menu of a game.
     """
 
     sequence: int
     time: float
     force: Triple
     rate: Triple
+    paused: bool = False
 
 
 class SetPoint(NamedTuple):
@@ -138,7 +145,8 @@ class FloatsFormat:
 
     def pack_cues(self, cues: Cues) -> bytes:
         """The datagram of cues, 76 bytes."""
-        body = self._CUES.pack(self.CUES_MAGIC, VERSION, 0, cues.sequence, cues.time, *cues.force, *cues.rate)
+        flags = (FLAGS_VERSION, _PAUSED) if cues.paused else (VERSION, 0)
+        body = self._CUES.pack(self.CUES_MAGIC, *flags, cues.sequence, cues.time, *cues.force, *cues.rate)
         return body + zlib.crc32(body).to_bytes(4, "little")
 
     def unpack_cues(self, data: bytes) -> Cues:
@@ -147,9 +155,10 @@ class FloatsFormat:
         Raises:
             DataError: size, magic, version or checksum are wrong.
         """
-        body = _checked(data, self.CUES_SIZE, self.CUES_MAGIC)
-        _, _, _, sequence, time, fx, fy, fz, wx, wy, wz = self._CUES.unpack(body)
-        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz))
+        body = _checked(data, self.CUES_SIZE, self.CUES_MAGIC, FLAGS_VERSION)
+        _, version, flags, sequence, time, fx, fy, fz, wx, wy, wz = self._CUES.unpack(body)
+        paused = version == FLAGS_VERSION and bool(flags & _PAUSED)
+        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz), paused)
 
     def pack_setpoint(self, setpoint: SetPoint) -> bytes:
         """The datagram of a set-point, 364 bytes."""
@@ -163,22 +172,22 @@ class FloatsFormat:
         Raises:
             DataError: size, magic, version, checksum or state are wrong.
         """
-        body = _checked(data, self.SETPOINT_SIZE, self.SETPOINT_MAGIC)
+        body = _checked(data, self.SETPOINT_SIZE, self.SETPOINT_MAGIC, VERSION)
         _, _, state, _, sequence, echo, echo_time, received, sent = self._HEAD.unpack_from(body)
         motion = np.frombuffer(body, dtype="<f8", offset=self._HEAD.size).astype(np.float64)
         return SetPoint(_state(state), sequence, echo, echo_time, received, sent, motion)
 
 
-def _checked(data: bytes, size: int, magic: bytes) -> bytes:
-    """The bytes before the checksum of a packet of the expected size, kind and version."""
+def _checked(data: bytes, size: int, magic: bytes, newest: int) -> bytes:
+    """The bytes before the checksum of a packet of the expected size, kind and version, 1 to ``newest``."""
     if len(data) != size:
         raise DataError(f"packet of {len(data)} bytes, expected {size}")
     body = data[:-4]
     if body[:4] != magic:
         raise DataError(f"packet begins with {body[:4]!r}, expected {magic!r}")
     version = int.from_bytes(body[4:6], "little")
-    if version != VERSION:
-        raise DataError(f"packet of version {version}, expected {VERSION}")
+    if not VERSION <= version <= newest:
+        raise DataError(f"packet of version {version}; versions up to {newest} are read")
     if zlib.crc32(body) != int.from_bytes(data[-4:], "little"):
         raise DataError("packet is damaged: its checksum is wrong")
     return body
@@ -204,15 +213,19 @@ class MessagePackFormat:
 
     def pack_cues(self, cues: Cues) -> bytes:
         """The datagram of cues."""
-        return bytes(self._library.packb({"version": VERSION} | cues._asdict()))
+        fields = {"version": FLAGS_VERSION if cues.paused else VERSION} | cues._asdict()
+        if not cues.paused:
+            del fields["paused"]
+        return bytes(self._library.packb(fields))
 
     def unpack_cues(self, data: bytes) -> Cues:
         """The cues of a datagram; their numbers may be NaN."""
-        fields = self._fields(data)
+        fields = self._fields(data, FLAGS_VERSION)
         sequence = _sequence(fields, "sequence", NO_SEQUENCE - 1)
         fx, fy, fz = _numbers(fields, "force", 3)
         wx, wy, wz = _numbers(fields, "rate", 3)
-        return Cues(sequence, _number("time", fields.get("time")), (fx, fy, fz), (wx, wy, wz))
+        paused = fields["version"] == FLAGS_VERSION and fields.get("paused") is True
+        return Cues(sequence, _number("time", fields.get("time")), (fx, fy, fz), (wx, wy, wz), paused)
 
     def pack_setpoint(self, setpoint: SetPoint) -> bytes:
         """The datagram of a set-point."""
@@ -223,7 +236,7 @@ class MessagePackFormat:
 
     def unpack_setpoint(self, data: bytes) -> SetPoint:
         """The set-point of a datagram; its numbers may be NaN."""
-        fields = self._fields(data)
+        fields = self._fields(data, VERSION)
         motion = np.zeros(MOTION_SIZE)
         for name, part in MOTION.items():
             motion[part] = _numbers(fields, name, part.stop - part.start)
@@ -237,7 +250,7 @@ class MessagePackFormat:
             motion=motion,
         )
 
-    def _fields(self, data: bytes) -> dict[str, Any]:
+    def _fields(self, data: bytes, newest: int) -> dict[str, Any]:
         if len(data) > LARGEST:
             raise DataError(f"packet of {len(data)} bytes, at most {LARGEST} are read")
         try:
@@ -246,8 +259,10 @@ class MessagePackFormat:
             raise DataError(f"packet is not MessagePack ({error})") from None
         if not isinstance(fields, dict):
             raise DataError(f"packet is no map but {type(fields).__name__}")
-        if fields.get("version") != VERSION:
-            raise DataError(f"packet of version {fields.get('version')!r}, expected {VERSION}")
+        if fields.get("version") not in range(VERSION, newest + 1):
+            raise DataError(
+                f"packet of version {fields.get('version')!r:.40}; versions up to {newest} are read"
+            )
         return fields
 
 

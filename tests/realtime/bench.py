@@ -63,9 +63,9 @@ class Bench:
         """Seconds."""
         return self.controller.periods / self.rate
 
-    def send(self, force=REST, rate=(0.0, 0.0, 0.0)) -> str:
+    def send(self, force=REST, rate=(0.0, 0.0, 0.0), paused=False) -> str:
         """The next packet of cues."""
-        cues = Cues(self.sequence, self.now, tuple(map(float, force)), tuple(map(float, rate)))
+        cues = Cues(self.sequence, self.now, tuple(map(float, force)), tuple(map(float, rate)), paused)
         self.sequence += 1
         return self.controller.inbox.take(FLOATS.pack_cues(cues), SENDER, self.now)
 

@@ -119,6 +119,41 @@ def test_cues_fade_in_when_the_policy_begins():
     np.testing.assert_allclose(logged.f_reference[:, 2], -9.81)
 
 
+@pytest.mark.parametrize("fade", [0.0, 0.5])
+def test_cues_fade_out_when_the_drive_pauses_and_in_when_it_goes_on(fade):
+    bench = Bench(watchdog=WatchdogOptions(steady=0.0, fade=fade))
+    for k in range(300):
+        paused = 100 <= k < 200
+        # What a menu sends means nothing.
+        bench.send((9.0, -9.0, 0.0) if paused else (1.0, 0.0, -9.81), (0.0, 0.0, 0.2), paused)
+        bench.step()
+    fractions = [[0, 0], [99, 1.0], [199, 0.0], [200, 0.0], [299, 1.0]]
+    if fade:
+        fractions += [[25, 0.5], [100, 0.98], [124, 0.5], [225, 0.5]]
+    else:
+        fractions[0][1] = fractions[3][1] = 1.0
+    steps, shares = np.array(fractions).T
+    logged = bench.trajectory()
+    np.testing.assert_allclose(logged.f_reference[steps.astype(int), 0], shares, atol=1e-12)
+    np.testing.assert_allclose(logged.w_reference[steps.astype(int), 2], 0.2 * shares, atol=1e-12)
+    np.testing.assert_allclose(logged.f_reference[:, 1:], np.tile([0.0, -9.81], (300, 1)))
+    assert states_of(bench) == [State.RUNNING]
+    assert bench.setpoints[150].echo == 99
+
+
+def test_a_pause_is_not_felt_as_a_jerk():
+    def largest_jerk(pause):
+        bench = Bench(watchdog=WatchdogOptions(steady=0.0, fade=1.0))
+        bench.drive(lane_change(4.0))
+        for _ in range(pause):
+            bench.send((0.0, 0.0, 0.0), paused=True)
+            bench.step()
+        bench.drive(lane_change(4.0))
+        return np.abs(np.diff(bench.trajectory().f_simulator, axis=0)).max() / 0.01
+
+    assert largest_jerk(pause=200) < 2.0 * largest_jerk(pause=0)
+
+
 @pytest.mark.parametrize("strange", STRANGE.values(), ids=STRANGE)
 def test_a_policy_that_fails_is_not_called_again(strange):
     policy = FullAcceleration(strange)

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motion_cueing.realtime.inbox import KINDS, Inbox, SequenceWindow
+from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.realtime.inbox import KINDS, CueBounds, Inbox, SequenceWindow
 from motion_cueing.realtime.packets import Cues, FloatsFormat
 
 FORM = FloatsFormat()
@@ -46,9 +47,33 @@ def test_each_kind_is_counted(inbox):
     assert inbox.age(now + 0.02) == pytest.approx(0.01)
     assert inbox.counts == {
         "used": 2, "malformed": 1, "not_finite": 2, "implausible": 3, "repeated": 1, "late": 1, "stale": 1,
-        "foreign": 1,
+        "foreign": 1, "paused": 0,
     }  # fmt: skip
     assert set(inbox.counts) == set(KINDS)
+
+
+def test_cues_beyond_chosen_bounds_are_not_used():
+    inbox = Inbox(FORM, STALE, GAP, bounds=CueBounds(force=30.0, rate=5.0))
+    assert inbox.take(packet(0, force=(30.0, 0.0, -9.81), rate=(0.0, 5.0, 0.0)), ONE, 0.0) == "used"
+    assert inbox.take(packet(1, force=(0.0, -30.1, -9.81)), ONE, 0.0) == "implausible"
+    assert inbox.take(packet(1, rate=(0.0, 0.0, 5.1)), ONE, 0.0) == "implausible"
+    assert inbox.newest.sequence == 0
+    with pytest.raises(ConfigurationError, match="force"):
+        CueBounds(force=0.0)
+
+
+def test_a_pause_keeps_the_sender_and_the_cues(inbox):
+    inbox.take(packet(0), ONE, 0.0)
+    for k in range(1, 101):
+        pause = Cues(k, 0.01 * k, (math.nan, 0.0, 1e9), (0.0, 0.0, 0.0), paused=True)
+        assert inbox.take(FORM.pack_cues(pause), ONE, 0.01 * k) == "paused"
+    assert inbox.paused
+    assert inbox.newest.sequence == 0
+    assert inbox.age(1.0) == 0.0
+    assert inbox.take(packet(101), OTHER, 1.01) == "foreign"
+    assert inbox.take(packet(101, time=1.01), ONE, 1.01) == "used"
+    assert not inbox.paused
+    assert inbox.lost == 0
 
 
 def test_cues_are_steady_from_the_last_gap_on(inbox):

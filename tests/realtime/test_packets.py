@@ -21,7 +21,7 @@ FORMATS = [make_format(name) for name in ("floats", "msgpack")]
 EVERY_FORMAT = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 NUMBER = st.floats(allow_nan=False)
 TRIPLE = st.tuples(NUMBER, NUMBER, NUMBER)
-CUES = st.builds(Cues, st.integers(0, 2**64 - 2), NUMBER, TRIPLE, TRIPLE)
+CUES = st.builds(Cues, st.integers(0, 2**64 - 2), NUMBER, TRIPLE, TRIPLE, st.booleans())
 MOTIONS = st.lists(NUMBER, min_size=MOTION_SIZE, max_size=MOTION_SIZE).map(np.array)
 COUNT = st.integers(0, 2**64 - 1)
 SETPOINTS = st.builds(SetPoint, st.sampled_from(State), COUNT, COUNT, NUMBER, NUMBER, NUMBER, MOTIONS)
@@ -80,6 +80,24 @@ def test_the_bytes_are_those_of_the_documentation():
     assert data == body + struct.pack("<I", zlib.crc32(body))
     assert len(data) == FloatsFormat.SETPOINT_SIZE == 364
     assert sorted(k for part in MOTION.values() for k in range(39)[part]) == list(range(39))
+
+
+def test_cues_of_a_paused_drive_are_of_version_2():
+    body = b"MCGC" + struct.pack("<HHQ", 2, 1, 7) + struct.pack("<7d", 1.5, 1.0, 2.0, -9.81, 0.1, 0.2, 0.3)
+    data = body + struct.pack("<I", zlib.crc32(body))
+    assert FORMATS[0].pack_cues(SOME._replace(paused=True)) == data
+    fields = msgpack.unpackb(FORMATS[1].pack_cues(SOME._replace(paused=True)))
+    assert (fields["version"], fields["paused"]) == (2, True)
+    assert "paused" not in msgpack.unpackb(FORMATS[1].pack_cues(SOME))
+    # In version 1 the field of flags had no meaning; version 3 is not known.
+    for version, paused in ((1, False), (2, True), (3, None)):
+        changed = data[:4] + struct.pack("<H", version) + data[6:-4]
+        changed += struct.pack("<I", zlib.crc32(changed))
+        if paused is None:
+            with pytest.raises(DataError, match="version 3"):
+                FORMATS[0].unpack_cues(changed)
+        else:
+            assert FORMATS[0].unpack_cues(changed) == SOME._replace(paused=paused)
 
 
 @given(bit=st.integers(0, 8 * 76 - 1))
