@@ -235,7 +235,7 @@ class LiveMachine(ABC):
 
     Attributes:
         ahead_steps: Time steps that the policy looks ahead.
-        motion: (2, 15) set-point of the machine ahead, see :class:`MotionView`.
+        motion: (2, 15) set-point of the machine ahead, see :class:`~.track.MotionView`.
     """
 
     ahead_steps = 0
