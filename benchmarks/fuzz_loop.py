@@ -1,6 +1,6 @@
 """A controller under datagrams that no sender means: does it crash, does a set-point leave the limits?
 
-Run it with `python -m benchmarks.fuzz_loop --datagrams 1000000`; docs/loop.md has what it found.
+Run it with `python -m benchmarks.fuzz_loop --datagrams 1000000`.
 """
 
 from __future__ import annotations
@@ -24,24 +24,31 @@ from motion_cueing.realtime.controller import Controller, ControllerOptions
 from motion_cueing.realtime.inbox import Inbox
 from motion_cueing.realtime.machine import make_machine
 from motion_cueing.realtime.packets import Cues, Format, make_format
-from motion_cueing.realtime.watchdog import Patience
+from motion_cueing.realtime.watchdog import WatchdogOptions
 
 RATE = 1000
 WILD = (math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0.0, -0.0, 1e3, -1e3, 100.0, 1e6)
 """Numbers that break code."""
-QUIET = 0.0001
-"""Share of the datagrams after which nothing comes for a while."""
+SILENCES = 0.0001
+"""Share of the periods at which a silence begins."""
 LONGEST_SPELL = 10.0
-"""Of one kind of sender, from a good one to one who sends nothing but trouble, s."""
-LONGEST_QUIET = 20.0
-"""Of such a pause, s: longer than any way home."""
+"""Longest time with one share of bad datagrams, s."""
+LONGEST_SILENCE = 20.0
+"""Longer than any return to neutral, s."""
 
 
 class Sender:
-    """Draws datagrams: noise, broken packets, and whole ones with cues and numbers of every kind."""
+    """Draws datagrams: noise, broken packets, and whole ones with cues and numbers of every kind.
 
-    def __init__(self, form: Format, seed: int) -> None:
+    Args:
+        form: Wire format.
+        seed: Of all draws.
+        pauses: Share of the whole packets that say that the drive is paused.
+    """
+
+    def __init__(self, form: Format, seed: int, pauses: float) -> None:
         self._form, self._random = form, np.random.default_rng(seed)
+        self._pauses, self._pause_random = pauses, np.random.default_rng(seed + 2)
         self._sequence, self._past = 0, [b"", b"MCGC", b"MCGS"]
         self._draws = (self._noise, self._old, self._broken, self._wild, self._rough)
         self._hostile, self._until = 0.0, 0.0
@@ -94,26 +101,27 @@ class Sender:
 
     def _packed(self, sequence: int, stamp: float, cues: list[float]) -> bytes:
         fx, fy, fz, wx, wy, wz = map(float, cues)
-        return self._form.pack_cues(Cues(max(sequence, 0), stamp, (fx, fy, fz), (wx, wy, wz)))
+        paused = bool(self._pause_random.random() < self._pauses)
+        return self._form.pack_cues(Cues(max(sequence, 0), stamp, (fx, fy, fz), (wx, wy, wz), paused))
 
 
 def moments(count: int, random: np.random.Generator) -> Iterator[int]:
-    """Datagrams in each period, ``count`` in all: one or a few, and now and then none for long."""
+    """Datagrams in each period, ``count`` in all: one or a few, and sometimes none for long."""
     while count > 0:
-        if random.random() < QUIET:
-            yield from itertools.repeat(0, int(RATE * random.uniform(0.0, LONGEST_QUIET)))
+        if random.random() < SILENCES:
+            yield from itertools.repeat(0, int(RATE * random.uniform(0.0, LONGEST_SILENCE)))
         now = min(count, int(random.choice([0, 1, 1, 1, 2, 5])))
         count -= now
         yield now
 
 
-def run(policy: str, form: Format, count: int, seed: int) -> int:
+def run(policy: str, form: Format, count: int, seed: int, pauses: float = 0.0) -> int:
     """Feed a controller; returns the set-points outside of the limits."""
-    platform, patience = get_platform("paper"), Patience()
+    platform, options = get_platform("paper"), WatchdogOptions()
     machine = make_machine(make_policy(policy, platform), platform)
-    inbox = Inbox(form, patience.stale, patience.overdue)
-    controller = Controller(machine, platform, inbox, ControllerOptions(rate=RATE, patience=patience))
-    sender, check = Sender(form, seed), LimitCheck(platform, RATE)
+    inbox = Inbox(form, options.stale, options.overdue)
+    controller = Controller(machine, platform, inbox, ControllerOptions(rate=RATE, watchdog=options))
+    sender, check = Sender(form, seed, pauses), LimitCheck(platform, RATE)
     states: Counter[str] = Counter()
     outside, begin = 0, time.perf_counter()
     for k, datagrams in enumerate(moments(count, np.random.default_rng(seed + 1))):
@@ -122,10 +130,10 @@ def run(policy: str, form: Format, count: int, seed: int) -> int:
             inbox.take(sender.datagram(now), ("127.0.0.1", 1), now)
         setpoint = controller.period(now)
         states[setpoint.state.name.lower()] += 1
-        wrong = check(setpoint)
-        if wrong:
+        fault = check(setpoint)
+        if fault:
             outside += 1
-            print(wrong, file=sys.stderr)
+            print(fault, file=sys.stderr)
     print(f"{policy}, {form.name}: {sum(inbox.counts.values())} datagrams, {controller.periods} set-points,")
     print(f"  {outside} outside of the limits, {time.perf_counter() - begin:.0f} s")
     print(f"  packets: {inbox.counts}, lost {inbox.lost}")
@@ -140,8 +148,10 @@ def main() -> int:
     parser.add_argument("--format", default="floats")
     parser.add_argument("--datagrams", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--pauses", type=float, default=0.0)
     given = parser.parse_args()
-    return int(run(given.policy, make_format(given.format), given.datagrams, given.seed) > 0)
+    form = make_format(given.format)
+    return int(run(given.policy, form, given.datagrams, given.seed, given.pauses) > 0)
 
 
 if __name__ == "__main__":

@@ -14,9 +14,9 @@ from ..envs.errors import ConfigurationError
 from ..envs.storage import check_file
 from ..evaluation.reporting.text import words_of
 from ..evaluation.selection import find_car, find_maneuvers, find_platform
-from ..realtime.client import Client, Trouble, cues_at
+from ..realtime.client import Client, NetworkFaults, cues_at
 from ..realtime.packets import make_format
-from ..realtime.report import report_of, tell
+from ..realtime.report import report_of, show
 from ..realtime.server import Endpoint, address_of, is_loopback
 from ..realtime.timing import undisturbed
 from ..train.training import Interrupt
@@ -72,12 +72,12 @@ def run(command: DriveCommand) -> int:
     _check(command)
     trace = _trace(command)
     to = address_of(command.to, DEFAULT_PORT)
-    trouble = Trouble(command.drop, command.repeat, command.late, command.nan, command.seed)
+    network = NetworkFaults(command.drop, command.repeat, command.late, command.nan, command.seed)
     # From the loopback address nothing leaves this machine; other targets are reached from any.
     endpoint = Endpoint(("127.0.0.1" if is_loopback(to) else "0.0.0.0", 0))
     try:
         platform, form = find_platform(command.platform), make_format(command.format)
-        client = Client(endpoint, to, form, platform, command.rate, trouble)
+        client = Client(endpoint, to, form, platform, command.rate, network)
         interrupt = Interrupt()
         with interrupt.caught(), undisturbed(command.cpu):
             client.run(cues_at(trace, command.rate, command.times), lambda: interrupt.asked)
@@ -111,5 +111,5 @@ def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
         states=client.states,
         faults=client.faults,
     )
-    tell(report, "set-points", command.report)
+    show(report, "set-points", command.report)
     return 0 if client.counts["received"] and not client.counts["outside_limits"] else 1

@@ -19,13 +19,13 @@ from ..envs.storage import check_file
 from ..evaluation.reporting.text import words_of
 from ..evaluation.selection import find_platform
 from ..realtime.controller import Controller, ControllerOptions
-from ..realtime.inbox import Inbox
+from ..realtime.inbox import CueBounds, Inbox
 from ..realtime.machine import LiveMachine, make_machine
 from ..realtime.packets import make_format
-from ..realtime.report import LoopReport, report_of, tell
+from ..realtime.report import LoopReport, report_of, show
 from ..realtime.server import Endpoint, Server, address_of, is_loopback
 from ..realtime.timing import undisturbed
-from ..realtime.watchdog import Patience, State
+from ..realtime.watchdog import State, WatchdogOptions
 from ..train.training import Interrupt
 
 DEFAULT_PORT: Final = 47100
@@ -56,16 +56,20 @@ class ServeCommand:
     """How packets are written."""
     duration: float | None = None
     """Time after which it brakes and ends, s; default: until Ctrl-C."""
-    overdue: float = Patience().overdue
+    overdue: float = WatchdogOptions().overdue
     """Age of the newest cues from which they are held, s."""
-    hold: float = Patience().hold
+    hold: float = WatchdogOptions().hold
     """Age from which the machine brakes and goes to neutral, s."""
-    stale: float = Patience().stale
+    stale: float = WatchdogOptions().stale
     """Delay on the way, beyond the least seen, from which a packet is too old, s."""
-    steady: float = Patience().steady
+    steady: float = WatchdogOptions().steady
     """How long cues must have come without a gap before the policy begins, s."""
-    fade: float = Patience().fade
+    fade: float = WatchdogOptions().fade
     """Time in which the cues come in then, s."""
+    max_force: float = 1000.0
+    """Largest plausible specific force on an axis, m/s^2; packets beyond it are not used."""
+    max_angular_velocity: float = 100.0
+    """Largest plausible angular velocity about an axis, rad/s."""
     lead: float = 0.001
     """Time before its first set-point at which a step of 10 ms is decided, s; at most a period."""
     cpu: int | None = None
@@ -121,10 +125,11 @@ def _check(command: ServeCommand) -> None:
 def _made(command: ServeCommand) -> _Served:
     from ..evaluation.policies import make_policy
 
-    patience = Patience(command.overdue, command.hold, command.stale, command.steady, command.fade)
-    options = ControllerOptions(rate=command.rate, patience=patience)
+    watchdog = WatchdogOptions(command.overdue, command.hold, command.stale, command.steady, command.fade)
+    options = ControllerOptions(rate=command.rate, watchdog=watchdog)
     peer = address_of(command.peer, 0) if command.peer else None
-    inbox = Inbox(make_format(command.format), patience.stale, patience.overdue, peer)
+    bounds = CueBounds(command.max_force, command.max_angular_velocity)
+    inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)
     platform = find_platform(command.platform)
     policy = make_policy(command.policy, platform)
     machine = make_machine(policy, platform, _VESTIBULAR)
@@ -167,7 +172,7 @@ def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
 def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: Endpoint) -> None:
     """Write the log and the report, and say what happened."""
     report = _report(command, served.controller, server, endpoint)
-    tell(report, "steps of 10 ms", command.report)
+    show(report, "steps of 10 ms", command.report)
     log = served.controller.log
     if command.log is not None and len(log) < 2:
         print(f"--log {command.log} is not written: it ended within the first steps", file=sys.stderr)

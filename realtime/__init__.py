@@ -1,17 +1,17 @@
-"""A policy as a controller in real time: cues come in, set-points go out."""
+"""Real-time loop: a policy as the controller of a motion base; cues arrive, set-points leave."""
 
 from .controller import Controller, ControllerOptions
 from .machine import make_machine
 from .packets import Cues, FloatsFormat, SetPoint
-from .watchdog import Patience, State
+from .watchdog import State, WatchdogOptions
 
 __all__ = [
     "Controller",
     "ControllerOptions",
     "Cues",
     "FloatsFormat",
-    "Patience",
     "SetPoint",
     "State",
+    "WatchdogOptions",
     "make_machine",
 ]

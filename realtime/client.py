@@ -1,4 +1,7 @@
-"""What a network does to packets: loses, repeats, delays and breaks some; drawn from a seed."""
+"""The test client of the controller: sends the cues of a drive in real time, and checks the set-points.
+
+It can also impair the network: packets that are lost, repeated, delayed or broken, drawn from a seed.
+"""
 
 from __future__ import annotations
 
@@ -15,23 +18,33 @@ from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.platform import Platform, actuator_limits
 from ..envs.platform.kernels import ACTUATORS
+from ..envs.platform.limits import limits_exceeded
 from .inbox import Address
 from .packets import NO_SEQUENCE, Cues, Format, SetPoint
 from .server import Endpoint
 from .timing import Histogram, Pace
 from .watchdog import State
 
-_DELAYS = (0.0005, 0.05)
+Floats = NDArray[np.float64]
+
+_DELAYS: Final = (0.0005, 0.05)
 """Shortest and longest delay of a late packet, s."""
+_TOLERANCE: Final = 1e-6
+"""Of each limit, relative; of a travel, of the whole stroke."""
+_LISTED_FAULTS: Final = 5
+"""Wrong set-points that are described; all are counted."""
+_LATEST: Final = 1e10
+"""Latest time that a clock may show, s: 300 years."""
+_NS: Final = 1e-9
 
 
-class Trouble:
-    """Turns the cues that should be sent into what is sent, and when.
+class NetworkFaults:
+    """Impairs packets on their way to the controller.
 
     Args:
         drop: Share of the packets that are lost.
-        repeat: Share that comes twice.
-        late: Share that comes up to 50 ms later than it should.
+        repeat: Share that arrives twice.
+        late: Share that is delayed by up to 50 ms.
         nan: Share with a NaN in it.
         seed: Of the draws.
     """
@@ -42,10 +55,10 @@ class Trouble:
                 raise ConfigurationError(f"--{name} must be a share from 0 to 1, found {share:g}")
         self._drop, self._repeat, self._late, self._nan = drop, repeat, late, nan
         self._random = np.random.default_rng(seed)
-        self._held: list[tuple[float, int, Cues]] = []
+        self._queue: list[tuple[float, int, Cues]] = []
 
     def sent(self, cues: Cues, now: float) -> Iterator[Cues]:
-        """What goes out now, s: the cues, unless something happens to them, and those that were held back."""
+        """The packets that leave now, s: these cues unless lost or delayed, and delayed ones that are due."""
         drop, repeat, late, nan = self._random.random(4)
         if nan < self._nan:
             cues = cues._replace(force=(math.nan, *cues.force[1:]))
@@ -53,26 +66,14 @@ class Trouble:
             due = now
             if late < self._late:
                 due += self._random.uniform(*_DELAYS)
-            copies = 2 if repeat < self._repeat else 1
-            for copy in range(copies):
-                heapq.heappush(self._held, (due, 2 * cues.sequence + copy, cues))
-        while self._held and self._held[0][0] <= now:
-            yield heapq.heappop(self._held)[2]
-
-
-# Whether set-points keep a machine's limits: position, velocity and acceleration of every actuator.
-
-
-Floats = NDArray[np.float64]
-
-_TOLERANCE = 1e-6
-"""Of each limit, relative; of a travel, of the whole stroke."""
-_UNLIMITED = 1e3
-"""Stroke that is taken for the tolerance where there is none, rad."""
+            for copy in range(2 if repeat < self._repeat else 1):
+                heapq.heappush(self._queue, (due, 2 * cues.sequence + copy, cues))
+        while self._queue and self._queue[0][0] <= now:
+            yield heapq.heappop(self._queue)[2]
 
 
 class LimitCheck:
-    """Holds each set-point, and what lies between two, against the limits.
+    """Holds set-points, and the change from one to the next, against the limits of the actuators.
 
     Args:
         platform: The machine.
@@ -80,64 +81,46 @@ class LimitCheck:
     """
 
     def __init__(self, platform: Platform, rate: int) -> None:
-        limits = actuator_limits(platform)
-        slack = _TOLERANCE * np.minimum(limits["position_max"] - limits["position_min"], _UNLIMITED)
-        self._low, self._high = limits["position_min"] - slack, limits["position_max"] + slack
-        self._velocity = limits["velocity"] * (1.0 + _TOLERANCE)
-        self._acceleration = limits["acceleration"] * (1.0 + _TOLERANCE)
-        self._rate = rate
-        self._before: tuple[int, Floats] | None = None
+        self._limits, self._rate = actuator_limits(platform), rate
+        self._last: tuple[int, Floats] | None = None
 
     def __call__(self, setpoint: SetPoint) -> str:
-        """What is wrong with a set-point, in words; nothing if nothing is."""
-        position = _actuators(setpoint.part("position"), setpoint.part("legs"))
-        velocity = _actuators(setpoint.part("velocity"), setpoint.part("leg_rates"))
+        """The fault of a set-point in words; empty if there is none."""
         if not np.isfinite(setpoint.motion).all():
             return f"set-point {setpoint.sequence} is not finite"
-        wrong = self._wrong("position", (position < self._low) | (position > self._high))
-        wrong = wrong or self._wrong("velocity", np.abs(velocity) > self._velocity)
-        if self._before is not None and setpoint.sequence > self._before[0]:
-            change = (velocity - self._before[1]) * self._rate / (setpoint.sequence - self._before[0])
-            wrong = wrong or self._wrong("acceleration", np.abs(change) > self._acceleration)
-        self._before = setpoint.sequence, velocity
-        return f"set-point {setpoint.sequence} exceeds the {wrong}" if wrong else ""
-
-    def _wrong(self, what: str, beyond: NDArray[np.bool_]) -> str:
-        return f"{what} limit of {ACTUATORS[int(np.argmax(beyond))]}" if beyond.any() else ""
-
-
-def _actuators(axes: Floats, legs: Floats) -> Floats:
-    """(9,) values of the actuators, of those of axes and legs."""
-    return np.concatenate([axes[:2], legs, axes[8:]])
-
-
-# The other side of the controller: sends a drive's cues in real time, and looks at what comes back.
-
-
-_NS: Final = 1e-9
-_MOST_FAULTS: Final = 5
-"""Wrong set-points that are told; all are counted."""
-_LATEST: Final = 1e10
-"""No clock shows more, s: that are 300 years."""
+        axes, legs = setpoint.part("position"), setpoint.part("legs")
+        position = np.concatenate([axes[:2], legs, axes[8:]])
+        axes, legs = setpoint.part("velocity"), setpoint.part("leg_rates")
+        velocity = np.concatenate([axes[:2], legs, axes[8:]])
+        acceleration = np.zeros(9)
+        if self._last is not None and setpoint.sequence > self._last[0]:
+            acceleration = (velocity - self._last[1]) * self._rate / (setpoint.sequence - self._last[0])
+        self._last = setpoint.sequence, velocity
+        exceeded = limits_exceeded(self._limits, position, velocity, acceleration, _TOLERANCE)
+        for limit, flags in exceeded._asdict().items():
+            if flags.any():
+                name = ACTUATORS[int(np.argmax(flags))]
+                return f"set-point {setpoint.sequence} exceeds the {limit} limit of {name}"
+        return ""
 
 
 class Client:
-    """Drives a controller through cues.
+    """Sends cues to a controller, and checks the set-points that return.
 
     Args:
         endpoint: Of this side.
-        to: The controller.
-        form: How packets are written.
+        to: Address of the controller.
+        form: Wire format.
         platform: The machine, whose limits the set-points must keep.
         rate: Packets a second, and set-points that are expected.
-        trouble: What happens to packets on the way.
+        network: Impairs the packets.
 
     Attributes:
-        counts: Set-points by what was found.
+        counts: Set-points by kind.
         states: Set-points by state of the controller.
-        timings: By name: "round_trip" from the sending of cues until the first set-point that knows of them;
-            "server" their time in the controller; "wake" how late a packet was sent.
-        faults: The first of what was wrong with set-points.
+        timings: Histograms by name: "round_trip" from the sending of cues until the first set-point that
+            they moved; "server" their time in the controller; "wake" how late a packet was sent.
+        faults: The first few faults of set-points.
         pace: Of the packets.
         periods: In which packets were due.
         duration: Of the run, s.
@@ -150,10 +133,10 @@ class Client:
         form: Format,
         platform: Platform,
         rate: int,
-        trouble: Trouble,
+        network: NetworkFaults,
     ) -> None:
         self._endpoint, self._to, self._form, self._rate = endpoint, to, form, rate
-        self._trouble, self._check = trouble, LimitCheck(platform, rate)
+        self._network, self._check = network, LimitCheck(platform, rate)
         kinds = ("received", "malformed", "foreign", "missing", "disordered", "outside_limits")
         self.counts = dict.fromkeys(kinds, 0)
         self.states = dict.fromkeys(State, 0)
@@ -163,7 +146,7 @@ class Client:
         self.periods = 0
         self.duration = 0.0
         self._last = -1
-        self._echoed = -1
+        self._echo = -1
 
     def run(self, cues: Iterator[Cues], stops: Callable[[], bool]) -> None:
         """Send cues, one a period, until there are no more or ``stops`` says so."""
@@ -175,14 +158,14 @@ class Client:
                 break
             now = time.perf_counter_ns()
             self.timings["wake"].add(now - pace.deadline)
-            for packet in self._trouble.sent(item._replace(time=_NS * now), _NS * now):
+            for packet in self._network.sent(item._replace(time=_NS * now), _NS * now):
                 self._endpoint.send(self._form.pack_cues(packet), self._to)
             self.periods += 1
             pace.done()
         self.duration = _NS * (time.perf_counter_ns() - begin)
 
     def listen(self, seconds: float) -> None:
-        """Go on listening."""
+        """Receive set-points for a while."""
         self._endpoint.listen(time.perf_counter_ns() + round(1e9 * seconds), self._take)
 
     def _take(self, data: bytes, sender: Address, now: int) -> None:
@@ -199,29 +182,26 @@ class Client:
             return
         self.counts["received"] += 1
         self.states[setpoint.state] += 1
-        self._look_at(setpoint, now)
-
-    def _look_at(self, setpoint: SetPoint, now: int) -> None:
         if setpoint.sequence <= self._last:
             self.counts["disordered"] += 1
             return
         if self._last >= 0:
             self.counts["missing"] += setpoint.sequence - self._last - 1
         self._last = setpoint.sequence
-        wrong = self._check(setpoint)
-        if wrong:
+        fault = self._check(setpoint)
+        if fault:
             self.counts["outside_limits"] += 1
-            self.faults += [wrong] if len(self.faults) < _MOST_FAULTS else []
-        if setpoint.echo not in (NO_SEQUENCE, self._echoed):
-            self._echoed = setpoint.echo
+            self.faults += [fault] if len(self.faults) < _LISTED_FAULTS else []
+        if setpoint.echo not in (NO_SEQUENCE, self._echo):
+            self._echo = setpoint.echo
             self.timings["round_trip"].add(now - round(1e9 * setpoint.echo_time))
             self.timings["server"].add(round(1e9 * (setpoint.sent - setpoint.received)))
 
 
 def cues_at(trace: CueTrace, rate: int, times: int) -> Iterator[Cues]:
-    """The cues of a drive, ``rate`` a second, over and over; their time stamps are to be filled in."""
+    """The cues of a drive, ``rate`` a second, ``times`` in a row; the sender fills in the time stamps."""
     trace = trace.resampled(1.0 / rate)
     forces, rates = trace.specific_force, trace.angular_velocity
     for k in range(len(trace) * times):
-        force, rate_now = forces[k % len(trace)].tolist(), rates[k % len(trace)].tolist()
-        yield Cues(k, math.nan, tuple(force), tuple(rate_now))
+        row = k % len(trace)
+        yield Cues(k, math.nan, tuple(forces[row].tolist()), tuple(rates[row].tolist()))

@@ -1,4 +1,10 @@
-"""What the controller did, step by step: little enough to keep for hours, enough to do it again."""
+"""The controller of the real-time loop: packets in, set-points out, period by period. No clock, no socket.
+
+packets -> inbox -> watchdog -> policy, or brake to neutral -> limits of the machine -> set-points
+
+Policies act every 10 ms, as in an evaluation. Set-points within such a time step are interpolated
+(:class:`~.machine.Track`).
+"""
 
 from __future__ import annotations
 
@@ -15,59 +21,59 @@ from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.settings import configuration
-from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
+from ..envs.simulator.simulator import TIME_STEP, Simulator
 from ..evaluation.rollout import Sample, record, trajectory_of
 from ..evaluation.suite import explain
 from ..evaluation.trajectory import Trajectory
 from .inbox import Inbox
 from .machine import AT_REST, LiveMachine, Track
 from .packets import NO_SEQUENCE, SetPoint
-from .watchdog import Homing, HomingOptions, Patience, Situation, State, next_state
+from .watchdog import BrakeOptions, BrakeToNeutral, Situation, State, WatchdogOptions, next_state
 
 Floats = NDArray[np.float64]
 
-_CUES: Final = slice(0, 6)
-_ACTION: Final = slice(6, 6 + N_AXES)
-_SECONDS: Final = 15
-_STATE: Final = 16
-_SIZE: Final = 17
+_ROW: Final = np.dtype([("cues", "f8", 6), ("action", "f8", 9), ("seconds", "f8"), ("state", "i8")])
 _CHUNK: Final = 6000
-"""Rows that are made room for at a time, a minute: a list of an hour would take long to grow."""
+"""Rows allocated at a time, one minute: growing one array of an hour would stall the loop."""
 
 
 class LoopLog:
-    """A row a time step: cues in use, accelerations asked for, time the policy took, state."""
+    """One row a time step: cues in use, accelerations, time the policy took, state of the controller."""
 
     def __init__(self) -> None:
-        self._chunks: list[Floats] = []
-        self._rows = 0
+        self._chunks: list[NDArray[Any]] = []
+        self._length = 0
 
     def __len__(self) -> int:
-        return self._rows
+        return self._length
 
     def add(self, cues: Floats, action: Floats, seconds: float, state: State) -> None:
-        """Keep a step.
+        """Log a time step.
 
         Args:
             cues: (6,) specific force, m/s^2, and angular velocity, rad/s, at its begin.
             action: (9,) accelerations in it, m/s^2 and rad/s^2.
-            seconds: Time the policy took; NaN if it was not asked.
+            seconds: Time the policy took; NaN if it did not act.
             state: Of the controller.
         """
-        place = self._rows % _CHUNK
-        if place == 0:
-            self._chunks.append(np.zeros((_CHUNK, _SIZE)))
-        row = self._chunks[-1][place]
-        row[_CUES], row[_ACTION], row[_SECONDS], row[_STATE] = cues, action, seconds, state
-        self._rows += 1
+        row = self._length % _CHUNK
+        if row == 0:
+            self._chunks.append(np.zeros(_CHUNK, _ROW))
+        self._chunks[-1][row] = (cues, action, seconds, state)
+        self._length += 1
+
+    @property
+    def rows(self) -> NDArray[Any]:
+        """(n,) rows with the fields cues, action, seconds and state."""
+        return np.concatenate([np.zeros(0, _ROW), *self._chunks])[: self._length]
 
     @property
     def states(self) -> NDArray[np.int64]:
-        """(n,) state in each step."""
-        return self._table()[:, _STATE].astype(np.int64)
+        """(n,) state in each time step."""
+        return np.asarray(self.rows["state"])
 
     def trajectory(self, platform: Platform, start: ArrayLike, vestibular: str, policy: Any) -> Trajectory:
-        """The drive as any other is recorded: its steps taken once more, with the same accelerations.
+        """The drive as a trajectory: its time steps are simulated again, with the same accelerations.
 
         Args:
             platform: The machine.
@@ -75,27 +81,24 @@ class LoopLog:
             vestibular: Perception model by name.
             policy: For its name, its parameters and its notes.
         """
-        table = self._table()
-        player = _Player(table, platform, vestibular)
-        cues = player.simulator.drives[0]
-        trajectory = trajectory_of(record(player, start), player, policy, cues, None)
-        steps = {f"loop_{state.name.lower()}": str(int((self.states == state).sum())) for state in State}
+        replay = _Replay(self.rows, platform, vestibular)
+        trajectory = trajectory_of(record(replay, start), replay, policy, replay.simulator.drives[0], None)
+        states = self.states
+        steps = {f"loop_{state.name.lower()}": str(int((states == state).sum())) for state in State}
         return replace(trajectory, metadata={**trajectory.metadata, **steps})
 
-    def _table(self) -> Floats:
-        if not self._chunks:
-            return np.zeros((0, _SIZE))
-        return np.concatenate(self._chunks)[: self._rows]
 
+class _Replay:
+    """Rollout of the logged accelerations."""
 
-class _Player:
-    """The driver that takes the logged steps."""
-
-    def __init__(self, table: Floats, platform: Platform, vestibular: str) -> None:
-        self._table = table
-        self.simulator = Simulator(
-            platform, _cues_of(table), vestibular=get_vestibular_model(vestibular), dt=TIME_STEP
-        )
+    def __init__(self, rows: NDArray[Any], platform: Platform, vestibular: str) -> None:
+        self._rows = rows
+        force, rate = rows["cues"][:, :3], rows["cues"][:, 3:]
+        # The controller had the angular acceleration of the step before.
+        change = np.diff(rate, axis=0, prepend=rate[:1]) / TIME_STEP
+        time = np.asarray(TIME_STEP * np.arange(len(rows)), dtype=np.float64)
+        cues = CueTrace("loop", time, force, rate, change, source="in the loop")
+        self.simulator = Simulator(platform, cues, vestibular=get_vestibular_model(vestibular), dt=TIME_STEP)
 
     def begin(self, start: ArrayLike) -> NDArray[Any]:
         """Put the machine at rest at a pose (9,); returns its state."""
@@ -103,40 +106,23 @@ class _Player:
 
     def samples(self) -> Iterator[Sample]:
         """One time step after another."""
-        for row in self._table:
-            yield Sample(row[_ACTION], self.simulator.step(row[_ACTION])[0], row[_SECONDS])
-
-
-def _cues_of(table: Floats) -> CueTrace:
-    """The cues in use, with the angular acceleration the controller took."""
-    rate = table[:, 3:6]
-    change = np.diff(rate, axis=0, prepend=rate[:1]) / TIME_STEP
-    time = np.asarray(TIME_STEP * np.arange(len(table)), dtype=np.float64)
-    return CueTrace("loop", time, table[:, :3], rate, change, source="in the loop")
-
-
-# The controller: packets in, set-points out, period by period. It knows no clock and no socket.
-#
-# packets -> inbox -> watchdog -> policy or the way home -> **limits of the machine** -> set-points
-
-
-_FOLLOWED: Final = (State.RUNNING, State.HOLDING)
-"""States in which the policy moves the machine."""
+        for row in self._rows:
+            yield Sample(row["action"], self.simulator.step(row["action"])[0], row["seconds"])
 
 
 @configuration
 class ControllerOptions:
-    """What can be chosen about the controller.
+    """Options of the controller.
 
     Args:
         rate: Set-points a second; a multiple of the policies' 100.
-        patience: Of the watchdog.
-        homing: How the machine goes home.
+        watchdog: Its time limits.
+        brake: How the machine brakes to neutral.
     """
 
     rate: int = 1000
-    patience: Patience = Patience()
-    homing: HomingOptions = HomingOptions()
+    watchdog: WatchdogOptions = WatchdogOptions()
+    brake: BrakeOptions = BrakeOptions()
 
     def __post_init__(self) -> None:
         decisions = round(1.0 / TIME_STEP)
@@ -153,29 +139,29 @@ class Controller:
         machine: With the policy.
         platform: The machine's limits.
         inbox: Sorts the packets.
-        options: What can be chosen.
+        options: Rate, watchdog and brake.
 
     Attributes:
-        state: What it does.
-        log: What it did.
-        faults: What the policy raised, in words.
+        state: Of the watchdog.
+        log: Of every time step.
+        faults: Errors that the policy raised, in words.
         periods: Set-points made.
     """
 
     def __init__(
         self, machine: LiveMachine, platform: Platform, inbox: Inbox, options: ControllerOptions
     ) -> None:
-        self.inbox, self._machine, self._patience = inbox, machine, options.patience
+        self.inbox, self._machine, self._options = inbox, machine, options.watchdog
         self.state, self.log = State.NEUTRAL, LoopLog()
         self.faults: list[str] = []
         self.periods = 0
-        self._homing = Homing(platform, machine.start, options.homing)
+        self._brake = BrakeToNeutral(platform, machine.start, options.brake)
         self._per_step = round(options.rate * TIME_STEP)
         self._track = Track(self._per_step, TIME_STEP)
-        self._rows: Floats = np.zeros((0, 0))
-        self._used = (NO_SEQUENCE, 0.0, 0.0)
+        self._motions: Floats = np.zeros((0, 0))
+        self._echo = (NO_SEQUENCE, 0.0, 0.0)
         self._stopping = self._decided = False
-        self._began = -1
+        self._faded = 0
 
     @property
     def decides(self) -> bool:
@@ -188,7 +174,7 @@ class Controller:
         return self._stopping and self.state is State.NEUTRAL
 
     def stop(self) -> None:
-        """Brake, go home, and stay there."""
+        """Brake to neutral, and stay there."""
         self._stopping = True
 
     def period(self, now: float) -> SetPoint:
@@ -200,9 +186,9 @@ class Controller:
         if self.decides:
             self.decide(now)
         self._decided = False
-        row = self._rows[self.periods % self._per_step]
+        motion = self._motions[self.periods % self._per_step]
         self.periods += 1
-        return SetPoint(self.state, self.periods - 1, *self._used, now, row)
+        return SetPoint(self.state, self.periods - 1, *self._echo, now, motion)
 
     def decide(self, now: float) -> None:
         """Take the next time step; once before its first period, as late as its time allows.
@@ -210,58 +196,56 @@ class Controller:
         Args:
             now: As of :meth:`period`.
         """
-        before = self.state
-        self.state = next_state(before, self._situation(now), self._patience)
-        if self.state not in _FOLLOWED and self.inbox.age(now) > self._patience.hold:
-            self.inbox.renew()
-        if before not in _FOLLOWED and self.state in _FOLLOWED:
-            self._began = len(self.log)
-        begin = self._machine.motion
-        self._catch_up()
-        action, seconds = self._moved(begins=self._began == len(self.log))
-        self.log.add(self._machine.reference_cue, action, seconds, self.state)
-        self._rows = self._track.between(begin, self._machine.motion)
+        machine, age, before = self._machine, self.inbox.age(now), self.state
+        neutral = self._brake.at_rest(machine.motion)
+        situation = Situation(age, self.inbox.steady, neutral, bool(self.faults), self._stopping)
+        self.state = next_state(before, situation, self._options)
+        if not self.state.follows and age > self._options.hold:
+            self.inbox.reset()
+        begins = self.state.follows and not before.follows
+        if begins:
+            self._faded = 0
+        begin = machine.motion
+        try:
+            machine.catch_up(self._cues())
+        # A policy is a user's code: whatever it raises, the machine must return to neutral.
+        except Exception as error:
+            self._fail(error)
+        action, seconds = self._move(begins)
+        self.log.add(machine.reference_cue, action, seconds, self.state)
+        self._motions = self._track.between(begin, machine.motion)
         self._decided = True
 
-    def _situation(self, now: float) -> Situation:
-        return Situation(
-            age=self.inbox.age(now),
-            steady=self.inbox.steady,
-            home=self._homing.arrived(self._machine.motion),
-            faulted=bool(self.faults),
-            stopping=self._stopping,
-        )
-
-    def _catch_up(self) -> None:
-        try:
-            self._machine.catch_up(self._cues())
-        # A policy is a user's code: whatever it raises, the machine must come home.
-        except Exception as error:
-            self._fault(error)
-
-    def _moved(self, begins: bool) -> tuple[Floats, float]:
-        """Move the machine, by its policy if that may and can, else homewards; accelerations, time of it."""
-        if self.state in _FOLLOWED:
+    def _move(self, begins: bool) -> tuple[Floats, float]:
+        """Move the machine by its policy, or brake; returns accelerations and the policy's time."""
+        if self.state.follows:
             try:
                 if begins:
                     self._machine.begin()
                 return self._machine.act()
             except Exception as error:
-                self._fault(error)
-        action = self._homing.accelerations(self._machine.motion)
+                self._fail(error)
+        action = self._brake.accelerations(self._machine.motion)
         self._machine.move(action)
         return action, math.nan
 
-    def _fault(self, error: Exception) -> None:
+    def _fail(self, error: Exception) -> None:
         self.faults.append(explain(error))
         self.state = State.BRAKING
 
     def _cues(self) -> Floats:
-        """(6,) cues for the policy: of a standing car unless it acts, faded in when it begins."""
-        newest = self.inbox.newest
-        if self.state not in _FOLLOWED or newest is None:
+        """(6,) cues for the policy: of a standing car unless it acts.
+
+        They fade in when it begins and after a pause of the drive, and out when such a pause begins.
+        """
+        newest, fade = self.inbox.newest, self._options.fade
+        if not self.state.follows or newest is None:
             return AT_REST
-        self._used = newest.sequence, newest.time, self.inbox.arrival
-        ran = (len(self.log) - self._began) * TIME_STEP
-        share = min(ran / self._patience.fade, 1.0) if self._patience.fade > 0.0 else 1.0
+        if self.inbox.paused:
+            self._faded = max(min(self._faded, math.ceil(fade / TIME_STEP)) - 1, 0)
+            share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 0.0
+        else:
+            self._echo = newest.sequence, newest.time, self.inbox.arrival
+            share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 1.0
+            self._faded += 1
         return np.asarray(AT_REST + share * (np.array(newest.force + newest.rate) - AT_REST))

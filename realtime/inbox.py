@@ -1,124 +1,155 @@
-"""Where a packet stands among those that came: new, repeated, late or beyond belief."""
+"""Packet filter: which of the cue packets that arrive are used; the others are counted by cause.
+
+===========  ==========================================================================================
+kind         cause
+===========  ==========================================================================================
+used         it is whole, new and in time
+malformed    size, magic, version or checksum are wrong
+not_finite   a NaN or an infinity
+implausible  beyond the bounds, 1000 m/s^2 and 100 rad/s, or more than 10,000 numbers ahead
+repeated     its number has arrived before
+late         overtaken by a packet with a higher number
+stale        delayed by more than ``stale`` beyond the quickest packet
+foreign      from another sender than the first, or than the named peer
+paused       the sender says that its drive is paused
+===========  ==========================================================================================
+"""
 
 from __future__ import annotations
 
 import math
-from enum import Enum
 from typing import Final
 
 from ..envs.errors import DataError
+from ..envs.settings import Positive, configuration
 from .packets import Cues, Format
 
-_WIDTH: Final = 64
-"""Numbers below the newest of which is known whether they came."""
+Address = tuple[str, int]
+"""Host and port."""
+
+KINDS: Final = (
+    "used",
+    "malformed",
+    "not_finite",
+    "implausible",
+    "repeated",
+    "late",
+    "stale",
+    "foreign",
+    "paused",
+)
+
+_LARGEST_JUMP: Final = 10_000
+"""Packets that may be lost in a row: 10 s at 1 kHz; the watchdog resets the filter after far less silence."""
+_DRIFT: Final = 1e-3
+"""Relative drift of the two clocks that is tolerated."""
+_WINDOW: Final = 64
+"""Numbers below the newest for which the window remembers whether they arrived."""
 
 
-class Place(Enum):
-    """Where a number stands among those that came."""
+@configuration
+class CueBounds:
+    """Bounds of plausible cues on each axis; packets beyond them are not used.
 
-    NEW = "used"
-    """Beyond all others."""
-    REPEATED = "repeated"
-    """It has come before."""
-    LATE = "late"
-    """Overtaken by a newer one."""
-    LEAPT = "leapt"
-    """So far ahead that it cannot be right."""
+    The defaults are those of a file of cues, more than any car reaches. Tires limit a road car to about
+    10 m/s^2: 30 m/s^2 and 5 rad/s let all of its drives pass, and stop most faults of a sender.
+
+    Args:
+        force: Largest specific force, m/s^2.
+        rate: Largest angular velocity, rad/s.
+    """
+
+    force: Positive = 1000.0
+    rate: Positive = 100.0
+
+
+ANY_CAR: Final = CueBounds()
 
 
 class SequenceWindow:
-    """Remembers which sequence numbers came, as RFC 4303 does against replays.
+    """Sliding window over sequence numbers, as RFC 4303 keeps against replays.
 
     Args:
-        leap: Greatest step ahead that is believed.
+        jump: Greatest step ahead that is accepted.
 
     Attributes:
-        lost: Numbers passed over that have not come since.
+        lost: Numbers that were passed over and have not arrived since.
     """
 
-    def __init__(self, leap: int) -> None:
-        self._leap = leap
+    def __init__(self, jump: int) -> None:
+        self._jump = jump
         self._first, self._newest = 0, -1
         self._seen = 0
         self.lost = 0
 
-    def put(self, number: int) -> Place:
-        """Say where a number stands, and remember it."""
+    def put(self, number: int) -> str:
+        """Register a number; returns its kind: used, repeated, late or implausible."""
         if self._newest < 0:
             self._first, self._newest, self._seen = number, number, 1
-            return Place.NEW
+            return "used"
         ahead = number - self._newest
-        if ahead > self._leap:
-            return Place.LEAPT
+        if ahead > self._jump:
+            return "implausible"
         if ahead > 0:
             self._newest = number
-            self._seen = ((self._seen << ahead) | 1) & (2**_WIDTH - 1) if ahead < _WIDTH else 1
+            self._seen = ((self._seen << ahead) | 1) & (2**_WINDOW - 1) if ahead < _WINDOW else 1
             self.lost += ahead - 1
-            return Place.NEW
-        return self._behind(number, -ahead)
-
-    def _behind(self, number: int, behind: int) -> Place:
-        if behind >= _WIDTH:
-            return Place.LATE
-        if self._seen >> behind & 1:
-            return Place.REPEATED
-        self._seen |= 1 << behind
-        # Numbers before the first that came were not passed over.
+            return "used"
+        if -ahead >= _WINDOW:
+            return "late"
+        if self._seen >> -ahead & 1:
+            return "repeated"
+        self._seen |= 1 << -ahead
+        # Numbers before the first one were not passed over.
         self.lost -= number > self._first
-        return Place.LATE
-
-
-# Which of the packets that come are used: those that are whole, new, in time, and from whom we listen to.
-
-
-Address = tuple[str, int]
-
-KINDS: Final = ("used", "malformed", "not_finite", "implausible", "repeated", "late", "stale", "foreign")
-"""What becomes of a packet that comes."""
-
-_LARGEST_FORCE: Final = 1000.0
-"""More than any car does, m/s^2; the same for a file of cues."""
-_LARGEST_RATE: Final = 100.0
-"""More than any car does, rad/s."""
-_LARGEST_LEAP: Final = 10_000
-"""Packets that may be lost in one go: 10 s of them, and far less silence renews the whole."""
-_DRIFT: Final = 1e-3
-"""How much faster one clock may run than the other."""
+        return "late"
 
 
 class Inbox:
-    """Sorts packets, and keeps the newest cues.
+    """Sorts packets by kind, and keeps the newest cues.
+
+    The delay of a packet is measured against the quickest one so far, so that the clocks need not agree.
 
     Args:
-        form: How packets are written.
-        stale: Delay beyond the least seen from which a packet is too old, s.
-        gap: Longest time between packets that come without a gap, s.
-        peer: Host and port to listen to alone; port 0 for any. None for whoever comes first.
+        form: Wire format.
+        stale: Delay beyond the least one so far from which a packet is too old, s.
+        gap: Longest time between packets without a gap, s.
+        peer: The only sender to listen to, host and port; port 0 for any. None for whoever sends first.
+        bounds: Of plausible cues.
 
     Attributes:
-        counts: Packets by kind, those of :data:`KINDS`; a lost one comes too late to count, or never.
+        counts: Packets by kind, see :data:`KINDS`.
         newest: Cues in use.
-        arrival: When they came, s.
+        paused: Whether a pause was the last that the sender said.
+        arrival: When the newest cues, or the pause, arrived, s.
         sender: Of the newest cues.
     """
 
-    def __init__(self, form: Format, stale: float, gap: float, peer: Address | None = None) -> None:
-        self._form, self._stale, self._gap, self._peer = form, stale, gap, peer
+    def __init__(
+        self,
+        form: Format,
+        stale: float,
+        gap: float,
+        peer: Address | None = None,
+        bounds: CueBounds = ANY_CAR,
+    ) -> None:
+        self._form, self._stale, self._gap, self._peer, self._bounds = form, stale, gap, peer, bounds
         self.counts = dict.fromkeys(KINDS, 0)
         self.newest: Cues | None = None
+        self.paused = False
         self.arrival = -math.inf
         self.sender: Address | None = None
-        self._since = math.inf
+        self._since = self._last_checked = math.inf
         self._lost = 0
-        self._window = SequenceWindow(_LARGEST_LEAP)
-        self._offset, self._looked = math.inf, math.inf
+        self._window = SequenceWindow(_LARGEST_JUMP)
+        self._least_delay = math.inf
         self._bound: Address | None = None
 
-    def renew(self) -> None:
-        """Listen to anyone again, with any sequence and any clock: the sender has been silent for long."""
+    def reset(self) -> None:
+        """Accept any sender, sequence and clock again, after a long silence."""
         self._lost = self.lost
-        self._window = SequenceWindow(_LARGEST_LEAP)
-        self._offset, self._bound = math.inf, None
+        self._window = SequenceWindow(_LARGEST_JUMP)
+        self._least_delay, self._bound = math.inf, None
 
     @property
     def lost(self) -> int:
@@ -126,53 +157,49 @@ class Inbox:
         return self._lost + self._window.lost
 
     def age(self, now: float) -> float:
-        """Of the newest cues, s; infinite before any."""
+        """Age of the newest cues, s; infinite before any."""
         return now - self.arrival
 
     @property
     def steady(self) -> float:
-        """How long cues have come without a gap, s."""
+        """Time for which cues have arrived without a gap, s."""
         return self.arrival - self._since if self.newest is not None else 0.0
 
     def take(self, data: bytes, sender: Address, now: float) -> str:
-        """Look at a datagram; returns what became of it, one of :data:`KINDS`."""
-        kind = self._sorted(data, sender, now)
+        """Sort a datagram that arrives now, s; returns its kind, one of :data:`KINDS`."""
+        kind = self._kind(data, sender, now)
         self.counts[kind] += 1
         return kind
 
-    def _sorted(self, data: bytes, sender: Address, now: float) -> str:
-        if not self._listens_to(sender):
+    def _kind(self, data: bytes, sender: Address, now: float) -> str:
+        if self._peer is not None:
+            host, port = self._peer
+            if sender[0] != host or port not in (0, sender[1]):
+                return "foreign"
+        elif self._bound not in (None, sender):
             return "foreign"
         try:
             cues = self._form.unpack_cues(data)
         except DataError:
             return "malformed"
-        numbers = (cues.time, *cues.force, *cues.rate)
-        if not all(map(math.isfinite, numbers)):
+        # The numbers of a pause mean nothing, but for its time.
+        force, rate = ((0.0,), (0.0,)) if cues.paused else (cues.force, cues.rate)
+        if not all(map(math.isfinite, (cues.time, *force, *rate))):
             return "not_finite"
-        if max(map(abs, cues.force)) > _LARGEST_FORCE or max(map(abs, cues.rate)) > _LARGEST_RATE:
+        if max(map(abs, force)) > self._bounds.force or max(map(abs, rate)) > self._bounds.rate:
             return "implausible"
-        return self._placed(cues, sender, now)
-
-    def _placed(self, cues: Cues, sender: Address, now: float) -> str:
-        place = self._window.put(cues.sequence)
-        if place is Place.LEAPT:
-            return "implausible"
-        if place is not Place.NEW:
-            return str(place.value)
-        offset = now - cues.time
-        self._offset = min(offset, self._offset + _DRIFT * max(now - self._looked, 0.0))
-        self._looked = now
-        if offset - self._offset > self._stale:
+        kind = self._window.put(cues.sequence)
+        if kind != "used":
+            return kind
+        delay = now - cues.time
+        self._least_delay = min(delay, self._least_delay + _DRIFT * max(now - self._last_checked, 0.0))
+        self._last_checked = now
+        if delay - self._least_delay > self._stale:
             return "stale"
         if not now - self.arrival <= self._gap:
             self._since = now
-        self.newest, self.arrival, self.sender = cues, now, sender
-        self._bound = sender
+        self.arrival, self.sender, self._bound, self.paused = now, sender, sender, cues.paused
+        if cues.paused:
+            return "paused"
+        self.newest = cues
         return "used"
-
-    def _listens_to(self, sender: Address) -> bool:
-        if self._peer is not None:
-            host, port = self._peer
-            return sender[0] == host and port in (0, sender[1])
-        return self._bound is None or sender == self._bound

@@ -1,15 +1,55 @@
-"""What goes over the wire: cues to the controller, set-points from it; as little-endian numbers.
+"""The datagrams of the real-time loop: cues to the controller, set-points from it. One datagram each.
 
-docs/loop.md has the layout byte by byte.
+Axes: x forward, y right, z down. SI units and radians. Specific force is f = a - g: (0, 0, -9.81) in a car
+that stands. The plain format ("floats") is little-endian, and ends in the CRC-32 of zlib over all before it.
+
+Cues, 76 bytes; a sender that knows no pause writes version 1:
+
+=====  =========  ================================================================
+bytes  type       content
+=====  =========  ================================================================
+0-3    4 bytes    ``MCGC``
+4-5    uint16     version, 1 or 2
+6-7    uint16     flags: in version 2, bit 0 says that the drive is paused; else 0
+8-15   uint64     sequence: one more for each packet
+16-23  double     time of the sender's clock, s
+24-47  3 doubles  specific force at the cab's reference point of the car, m/s^2
+48-71  3 doubles  angular velocity of the car, rad/s
+72-75  uint32     CRC-32 of bytes 0-71
+=====  =========  ================================================================
+
+Set-points, version 1, 364 bytes, for the end of the period that begins when they are sent:
+
+=======  =========  =================================================================================
+bytes    type       content
+=======  =========  =================================================================================
+0-3      4 bytes    ``MCGS``
+4-5      uint16     version, 1
+6        uint8      state of the controller, see :class:`~.watchdog.State`
+7        uint8      0
+8-15     uint64     sequence: one more for each set-point
+16-23    uint64     echo: sequence of the cues that last moved the machine; 2^64 - 1 before any
+24-31    double     their time stamp, s of the sender's clock
+32-39    double     when they arrived, s of the controller's clock
+40-47    double     when this set-point was made, s of the controller's clock
+48-119   9 doubles  positions: carriage x, y; surge, sway, heave, roll, pitch, yaw from neutral; turntable
+120-191  9 doubles  velocities of the same (Euler rates)
+192-263  9 doubles  accelerations of the same
+264-311  6 doubles  extensions of legs 1 to 6 from neutral, m
+312-359  6 doubles  their rates, m/s
+360-363  uint32     CRC-32 of bytes 0-359
+=======  =========  =================================================================================
+
+MessagePack ("msgpack") has the same content as maps. Cues: ``version``, ``sequence``, ``time``, ``force``,
+``rate``; in version 2 ``paused``, a boolean. Set-points: ``version``, ``state``, ``sequence``, ``echo``,
+``echo_time``, ``received``, ``sent``, ``position``, ``velocity``, ``acceleration``, ``legs``, ``leg_rates``.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable, Mapping
-from importlib import import_module
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +61,18 @@ Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 VERSION: Final = 1
-"""Of both packets; a reader refuses others."""
+"""Of set-points, and of cues without flags; a reader refuses unknown versions."""
+
+FLAGS_VERSION: Final = 2
+"""Of cues with flags."""
+
+_PAUSED: Final = 1
 
 LARGEST: Final = 2048
-"""Bytes of a datagram that is looked at; ours are far below."""
+"""Longest datagram that is read, bytes."""
 
 NO_SEQUENCE: Final = 2**64 - 1
-"""Echoed before any cues have come."""
+"""Echo before any cues have arrived."""
 
 MOTION: Final = {
     "position": slice(0, 9),
@@ -36,39 +81,39 @@ MOTION: Final = {
     "legs": slice(27, 33),
     "leg_rates": slice(33, 39),
 }
-"""Where each part of a set-point's motion lies among its numbers."""
+"""Parts of a set-point's motion."""
 
 MOTION_SIZE: Final = 39
-"""Numbers of a set-point's motion."""
 
 
 class Cues(NamedTuple):
-    """What the driver of the car feels at a moment.
+    """Cues of the car at one moment.
 
     Args:
         sequence: Number of the packet, one more for each.
         time: Of the sender's clock, s.
-        force: Specific force f = a - g at the cab's reference point of the car, m/s^2; x forward, y right,
-            z down.
+        force: Specific force f = a - g at the cab's reference point of the car, m/s^2.
         rate: Angular velocity of the car, rad/s.
+        paused: Whether the drive is paused: force and rate mean nothing, as in the menu of a game.
     """
 
     sequence: int
     time: float
     force: Triple
     rate: Triple
+    paused: bool = False
 
 
 class SetPoint(NamedTuple):
-    """Where the machine is to be at the end of a period, and what the controller is doing.
+    """Set-point of the machine for the end of a period, with the state of the controller.
 
     Args:
         state: Of the controller.
         sequence: Number of the set-point, one more for each.
-        echo: Number of the cues that last moved the machine, or :data:`NO_SEQUENCE`.
+        echo: Sequence of the cues that last moved the machine, or :data:`NO_SEQUENCE`.
         echo_time: Their time stamp, s of the sender's clock.
-        received: When they came, s of the controller's clock.
-        sent: When this was made, s of the same.
+        received: When they arrived, s of the controller's clock.
+        sent: When this was made, s of the controller's clock.
         motion: (39,) position, velocity and acceleration of the nine axes in the order of ``AXES``,
             extensions and rates of the legs, as in :data:`MOTION`; SI units, from neutral.
     """
@@ -86,113 +131,70 @@ class SetPoint(NamedTuple):
         return self.motion[MOTION[name]]
 
 
-class Format(Protocol):
-    """Turns packets into bytes, and back; what is broken raises a DataError."""
-
-    @property
-    def name(self) -> str:
-        """What it is called on the command line."""
-        ...
-
-    def pack_cues(self, cues: Cues) -> bytes:
-        """A datagram of cues."""
-        ...
-
-    def unpack_cues(self, data: bytes) -> Cues:
-        """The cues of a datagram; their numbers may be NaN."""
-        ...
-
-    def pack_setpoint(self, setpoint: SetPoint) -> bytes:
-        """A datagram of a set-point."""
-        ...
-
-    def unpack_setpoint(self, data: bytes) -> SetPoint:
-        """The set-point of a datagram."""
-        ...
-
-
 class FloatsFormat:
-    """Little-endian doubles between a header and a CRC-32 of all before it."""
+    """The plain binary format; a broken packet raises a DataError."""
 
     name = "floats"
 
     _CUES: Final = struct.Struct("<4sHHQ7d")
     _HEAD: Final = struct.Struct("<4sHBBQQ3d")
-    _CRC: Final = struct.Struct("<I")
     CUES_MAGIC: Final = b"MCGC"
     SETPOINT_MAGIC: Final = b"MCGS"
-    CUES_SIZE: Final = _CUES.size + _CRC.size
-    SETPOINT_SIZE: Final = _HEAD.size + 8 * MOTION_SIZE + _CRC.size
+    CUES_SIZE: Final = _CUES.size + 4
+    SETPOINT_SIZE: Final = _HEAD.size + 8 * MOTION_SIZE + 4
 
     def pack_cues(self, cues: Cues) -> bytes:
-        """76 bytes."""
-        body = self._CUES.pack(self.CUES_MAGIC, VERSION, 0, cues.sequence, cues.time, *cues.force, *cues.rate)
-        return self._sealed(body)
+        """The datagram of cues, 76 bytes."""
+        flags = (FLAGS_VERSION, _PAUSED) if cues.paused else (VERSION, 0)
+        body = self._CUES.pack(self.CUES_MAGIC, *flags, cues.sequence, cues.time, *cues.force, *cues.rate)
+        return body + zlib.crc32(body).to_bytes(4, "little")
 
     def unpack_cues(self, data: bytes) -> Cues:
-        """The cues of a datagram.
+        """The cues of a datagram; their numbers may be NaN.
 
         Raises:
             DataError: size, magic, version or checksum are wrong.
         """
-        body = self._opened(data, self.CUES_SIZE, self.CUES_MAGIC)
-        _, _, _, sequence, time, fx, fy, fz, wx, wy, wz = self._CUES.unpack(body)
-        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz))
+        body = _checked(data, self.CUES_SIZE, self.CUES_MAGIC, FLAGS_VERSION)
+        _, version, flags, sequence, time, fx, fy, fz, wx, wy, wz = self._CUES.unpack(body)
+        paused = version == FLAGS_VERSION and bool(flags & _PAUSED)
+        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz), paused)
 
     def pack_setpoint(self, setpoint: SetPoint) -> bytes:
-        """364 bytes."""
+        """The datagram of a set-point, 364 bytes."""
         head = self._HEAD.pack(self.SETPOINT_MAGIC, VERSION, setpoint.state, 0, *setpoint[1:6])
-        return self._sealed(head + np.asarray(setpoint.motion, dtype="<f8").tobytes())
+        body = head + np.asarray(setpoint.motion, dtype="<f8").tobytes()
+        return body + zlib.crc32(body).to_bytes(4, "little")
 
     def unpack_setpoint(self, data: bytes) -> SetPoint:
-        """The set-point of a datagram.
+        """The set-point of a datagram; its numbers may be NaN.
 
         Raises:
             DataError: size, magic, version, checksum or state are wrong.
         """
-        body = self._opened(data, self.SETPOINT_SIZE, self.SETPOINT_MAGIC)
+        body = _checked(data, self.SETPOINT_SIZE, self.SETPOINT_MAGIC, VERSION)
         _, _, state, _, sequence, echo, echo_time, received, sent = self._HEAD.unpack_from(body)
         motion = np.frombuffer(body, dtype="<f8", offset=self._HEAD.size).astype(np.float64)
-        return SetPoint(state_of(state), sequence, echo, echo_time, received, sent, motion)
-
-    def _sealed(self, body: bytes) -> bytes:
-        return body + self._CRC.pack(zlib.crc32(body))
-
-    def _opened(self, data: bytes, size: int, magic: bytes) -> bytes:
-        """What lies before the checksum."""
-        if len(data) != size:
-            raise DataError(f"packet of {len(data)} bytes, expected {size}")
-        body = data[:-4]
-        if body[:4] != magic:
-            raise DataError(f"packet begins with {body[:4]!r}, expected {magic!r}")
-        version = int.from_bytes(body[4:6], "little")
-        if version != VERSION:
-            raise DataError(f"packet of version {version}, expected {VERSION}")
-        if zlib.crc32(body) != self._CRC.unpack(data[-4:])[0]:
-            raise DataError("packet is damaged: its checksum is wrong")
-        return body
+        return SetPoint(_state(state), sequence, echo, echo_time, received, sent, motion)
 
 
-def state_of(value: Any) -> State:
-    """The state of a number.
-
-    Raises:
-        DataError: there is none.
-    """
-    try:
-        return State(value)
-    except ValueError:
-        raise DataError(f"packet: there is no state {value!r}") from None
-
-
-# The same packets in MessagePack, for senders that have a library for it; docs/loop.md has the fields.
-
-
-_HEAD: Final = ("sequence", "echo", "echo_time", "received", "sent")
+def _checked(data: bytes, size: int, magic: bytes, newest: int) -> bytes:
+    """The bytes before the checksum of a packet of the expected size, kind and version, 1 to ``newest``."""
+    if len(data) != size:
+        raise DataError(f"packet of {len(data)} bytes, expected {size}")
+    body = data[:-4]
+    if body[:4] != magic:
+        raise DataError(f"packet begins with {body[:4]!r}, expected {magic!r}")
+    version = int.from_bytes(body[4:6], "little")
+    if not VERSION <= version <= newest:
+        raise DataError(f"packet of version {version}; versions up to {newest} are read")
+    if zlib.crc32(body) != int.from_bytes(data[-4:], "little"):
+        raise DataError("packet is damaged: its checksum is wrong")
+    return body
 
 
 class MessagePackFormat:
-    """Maps with the names of the fields.
+    """Maps with the names of the fields, for senders with a MessagePack library; raises as FloatsFormat does.
 
     Raises:
         ConfigurationError: the library is missing.
@@ -202,54 +204,53 @@ class MessagePackFormat:
 
     def __init__(self) -> None:
         try:
-            self._library: Any = import_module("msgpack")
+            import msgpack  # type: ignore[import-untyped]
         except ImportError:
             raise ConfigurationError(
                 "--format msgpack needs a package: pip install 'motion-cueing-gym[loop]'"
             ) from None
+        self._library: Any = msgpack
 
     def pack_cues(self, cues: Cues) -> bytes:
-        """A map of version, sequence, time, force and rate."""
-        return self._packed({"version": VERSION} | cues._asdict())
-
-    def unpack_cues(self, data: bytes) -> Cues:
-        """The cues of a datagram.
-
-        Raises:
-            DataError: it is no such map.
-        """
-        fields = self._fields(data)
-        sequence = _sequence(fields.get("sequence"), NO_SEQUENCE - 1)
-        fx, fy, fz = _numbers("force", fields.get("force"), 3)
-        wx, wy, wz = _numbers("rate", fields.get("rate"), 3)
-        return Cues(sequence, _number("time", fields.get("time")), (fx, fy, fz), (wx, wy, wz))
-
-    def pack_setpoint(self, setpoint: SetPoint) -> bytes:
-        """A map of version, state, sequences, times and the parts of the motion."""
-        head = {name: getattr(setpoint, name) for name in _HEAD}
-        parts = {name: setpoint.part(name).tolist() for name in MOTION}
-        return self._packed({"version": VERSION, "state": int(setpoint.state)} | head | parts)
-
-    def unpack_setpoint(self, data: bytes) -> SetPoint:
-        """The set-point of a datagram.
-
-        Raises:
-            DataError: it is no such map.
-        """
-        fields = self._fields(data)
-        sequences = [_sequence(fields.get(name), NO_SEQUENCE) for name in _HEAD[:2]]
-        times = [_number(name, fields.get(name)) for name in _HEAD[2:]]
-        motion = np.zeros(MOTION_SIZE)
-        for name, where in MOTION.items():
-            motion[where] = _numbers(name, fields.get(name), where.stop - where.start)
-        return SetPoint(
-            state_of(fields.get("state")), sequences[0], sequences[1], times[0], times[1], times[2], motion
-        )
-
-    def _packed(self, fields: dict[str, Any]) -> bytes:
+        """The datagram of cues."""
+        fields = {"version": FLAGS_VERSION if cues.paused else VERSION} | cues._asdict()
+        if not cues.paused:
+            del fields["paused"]
         return bytes(self._library.packb(fields))
 
-    def _fields(self, data: bytes) -> dict[str, Any]:
+    def unpack_cues(self, data: bytes) -> Cues:
+        """The cues of a datagram; their numbers may be NaN."""
+        fields = self._fields(data, FLAGS_VERSION)
+        sequence = _sequence(fields, "sequence", NO_SEQUENCE - 1)
+        fx, fy, fz = _numbers(fields, "force", 3)
+        wx, wy, wz = _numbers(fields, "rate", 3)
+        paused = fields["version"] == FLAGS_VERSION and fields.get("paused") is True
+        return Cues(sequence, _number("time", fields.get("time")), (fx, fy, fz), (wx, wy, wz), paused)
+
+    def pack_setpoint(self, setpoint: SetPoint) -> bytes:
+        """The datagram of a set-point."""
+        fields = {"version": VERSION} | setpoint._asdict() | {"state": int(setpoint.state)}
+        del fields["motion"]
+        parts = {name: setpoint.part(name).tolist() for name in MOTION}
+        return bytes(self._library.packb(fields | parts))
+
+    def unpack_setpoint(self, data: bytes) -> SetPoint:
+        """The set-point of a datagram; its numbers may be NaN."""
+        fields = self._fields(data, VERSION)
+        motion = np.zeros(MOTION_SIZE)
+        for name, part in MOTION.items():
+            motion[part] = _numbers(fields, name, part.stop - part.start)
+        return SetPoint(
+            state=_state(fields.get("state")),
+            sequence=_sequence(fields, "sequence", NO_SEQUENCE),
+            echo=_sequence(fields, "echo", NO_SEQUENCE),
+            echo_time=_number("echo_time", fields.get("echo_time")),
+            received=_number("received", fields.get("received")),
+            sent=_number("sent", fields.get("sent")),
+            motion=motion,
+        )
+
+    def _fields(self, data: bytes, newest: int) -> dict[str, Any]:
         if len(data) > LARGEST:
             raise DataError(f"packet of {len(data)} bytes, at most {LARGEST} are read")
         try:
@@ -258,14 +259,24 @@ class MessagePackFormat:
             raise DataError(f"packet is not MessagePack ({error})") from None
         if not isinstance(fields, dict):
             raise DataError(f"packet is no map but {type(fields).__name__}")
-        if fields.get("version") != VERSION:
-            raise DataError(f"packet of version {fields.get('version')!r}, expected {VERSION}")
+        if fields.get("version") not in range(VERSION, newest + 1):
+            raise DataError(
+                f"packet of version {fields.get('version')!r:.40}; versions up to {newest} are read"
+            )
         return fields
 
 
-def _sequence(value: Any, largest: int) -> int:
+def _state(value: Any) -> State:
+    try:
+        return State(value)
+    except ValueError:
+        raise DataError(f"packet: there is no state {value!r}") from None
+
+
+def _sequence(fields: dict[str, Any], name: str, largest: int) -> int:
+    value = fields.get(name)
     if type(value) is not int or not 0 <= value <= largest:
-        raise DataError(f"packet: a sequence number must be from 0 to {largest}, found {value!r:.40}")
+        raise DataError(f"packet: {name} must be a number from 0 to {largest}, found {value!r:.40}")
     return value
 
 
@@ -275,26 +286,22 @@ def _number(name: str, value: Any) -> float:
     return float(value)
 
 
-def _numbers(name: str, values: Any, count: int) -> list[float]:
+def _numbers(fields: dict[str, Any], name: str, count: int) -> list[float]:
+    values = fields.get(name)
     if not isinstance(values, list) or len(values) != count:
         raise DataError(f"packet: {name} must be {count} numbers, found {values!r:.40}")
     return [_number(name, value) for value in values]
 
 
-# How packets are written, by name.
-
-
-_FORMATS: Final[Mapping[str, Callable[[], Format]]] = {
-    FloatsFormat.name: FloatsFormat,
-    MessagePackFormat.name: MessagePackFormat,
-}
+Format: TypeAlias = FloatsFormat | MessagePackFormat
 
 
 def make_format(name: str) -> Format:
-    """A format by name: floats or msgpack.
+    """A wire format by name: floats or msgpack.
 
     Raises:
         UnknownNameError: there is none of this name.
         ConfigurationError: its library is missing.
     """
-    return look_up("format", name, _FORMATS)()
+    formats: dict[str, type[Format]] = {form.name: form for form in (FloatsFormat, MessagePackFormat)}
+    return look_up("format", name, formats)()

@@ -1,17 +1,19 @@
-"""What a controller or its client counted and timed, as JSON and as a table."""
+"""Report of a run of the real-time loop: counts and timings, as JSON and as a table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 from ..envs.provenance import hardware
 from ..envs.settings import configuration
 from ..evaluation.reporting.text import NOTHING, TextTable, print_table, table_console
 from ..evaluation.saved import Headed
-from .timing import QUANTILES, Histogram, Pace, TimingSummary
+from .client import Client
+from .server import Server
+from .timing import QUANTILES, TimingSummary
 from .watchdog import State
 
 SCHEMA: Final = 1
@@ -20,18 +22,18 @@ SCHEMA: Final = 1
 
 @configuration
 class LoopReport(Headed):
-    """A run of the controller, or of its client.
+    """A run of the controller, or of its test client.
 
     Args:
-        hardware: What it ran on.
+        hardware: Processor and system.
         duration: From the first period to the last, s.
-        periods: That were made.
-        overrun: That were not over when the next should have begun.
-        skipped: That were left out, as an earlier one took so long.
-        packets: That came, by what became of them.
-        states: By state of the controller: its steps of 10 ms; of a client, the set-points that came.
-        timings: By name, see docs/loop.md.
-        faults: What the policy raised; or what was wrong with the set-points.
+        periods: Number of periods.
+        overrun: Periods that were not over when the next should have begun.
+        skipped: Periods left out, since an earlier one took too long.
+        packets: Packets received, by kind.
+        states: Counts by state: time steps of a controller, set-points received by a client.
+        timings: By name, see :mod:`~.server` and :class:`~.client.Client`.
+        faults: Errors that the policy raised, or limits that set-points exceeded.
     """
 
     what = "the report of a loop"
@@ -48,17 +50,9 @@ class LoopReport(Headed):
     faults: tuple[str, ...] = ()
 
 
-class Timed(Protocol):
-    """Who ran at a pace: a server or a client."""
-
-    timings: dict[str, Histogram]
-    pace: Pace
-    duration: float
-
-
 def report_of(
     words: Sequence[str],
-    who: Timed,
+    run: Server | Client,
     periods: int,
     packets: dict[str, int],
     states: Mapping[State, int],
@@ -68,72 +62,69 @@ def report_of(
 
     Args:
         words: The command line.
-        who: Ran.
-        periods: That were made.
-        packets: By what became of them.
+        run: Server or client after it.
+        periods: Number of periods.
+        packets: By kind.
         states: By state of the controller.
         faults: In words.
     """
     return LoopReport(
         **LoopReport.head(words),
         hardware=hardware("cpu"),
-        duration=who.duration,
+        duration=run.duration,
         periods=periods,
-        overrun=who.pace.overrun,
-        skipped=who.pace.skipped,
+        overrun=run.pace.overrun,
+        skipped=run.pace.skipped,
         packets=packets,
         states={state.name.lower(): count for state, count in states.items()},
-        timings={name: histogram.summary() for name, histogram in who.timings.items()},
+        timings={name: histogram.summary() for name, histogram in run.timings.items()},
         faults=tuple(faults),
     )
 
 
-def timing_table(report: LoopReport) -> TextTable:
-    """The timings, in microseconds."""
-    header = ("time, us", "count", "mean", *(name.replace("_", ".") for name in QUANTILES), "max")
-    rows = [
-        (name, str(found.count), *(_microseconds(getattr(found, key)) for key in ("mean", *QUANTILES, "max")))
-        for name, found in report.timings.items()
-    ]
-    return TextTable("Timings", header, tuple(rows))
-
-
-def lines_of(report: LoopReport, counted_in: str) -> list[str]:
-    """What was counted, in words; what did not happen is left out.
+def summary_lines(report: LoopReport, unit: str) -> list[str]:
+    """The counts in words; zeros are left out.
 
     Args:
         report: The report.
-        counted_in: What its ``states`` count.
+        unit: Of its ``states``.
     """
     missed = report.overrun + report.skipped
-    share = missed / max(report.periods + report.skipped, 1)
-    counted = ", ".join(
-        f"{name.replace('_', ' ')} {count}" for name, count in report.packets.items() if count
-    )
-    states = ", ".join(f"{name} {count}" for name, count in report.states.items() if count)
+    percent = 100.0 * missed / max(report.periods + report.skipped, 1)
+    packets = ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in report.packets.items() if n)
+    states = ", ".join(f"{name} {n}" for name, n in report.states.items() if n)
     lines = [
-        f"{report.periods} periods in {report.duration:.1f} s; deadlines missed: {missed} "
-        f"({100.0 * share:.4f} %), {report.overrun} late and {report.skipped} left out",
-        f"packets: {counted or 'none'}",
+        f"{report.periods} periods in {report.duration:.1f} s; deadlines missed: {missed} ({percent:.4f} %), "
+        f"{report.overrun} late and {report.skipped} left out",
+        f"packets: {packets or 'none'}",
     ]
-    return [*lines, *([f"{counted_in}: {states}"] if states else []), *report.faults]
+    return [*lines, *([f"{unit}: {states}"] if states else []), *report.faults]
 
 
-def tell(report: LoopReport, counted_in: str, file: Path | None) -> None:
+def timing_table(report: LoopReport) -> TextTable:
+    """The timings, in microseconds."""
+    columns = ("mean", *QUANTILES, "max")
+    rows = []
+    for name, summary in report.timings.items():
+        seconds = [getattr(summary, column) for column in columns]
+        rows.append(
+            (name, str(summary.count), *(NOTHING if s is None else f"{1e6 * s:.1f}" for s in seconds))
+        )
+    header = ("time, us", "count", *(column.replace("_", ".") for column in columns))
+    return TextTable("Timings", header, tuple(rows))
+
+
+def show(report: LoopReport, unit: str, file: Path | None) -> None:
     """Print a report, and write it where a file is named.
 
     Args:
         report: The report.
-        counted_in: What its ``states`` count.
+        unit: Of its ``states``.
         file: JSON.
     """
     console = table_console()
-    for line in lines_of(report, counted_in):
+    for line in summary_lines(report, unit):
         console.print(line, highlight=False, markup=False)
     print_table(console, timing_table(report))
     if file is not None:
         report.save_json(file)
-
-
-def _microseconds(seconds: float | None) -> str:
-    return NOTHING if seconds is None else f"{1e6 * seconds:.1f}"

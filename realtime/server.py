@@ -1,4 +1,17 @@
-"""A UDP socket that is waited on until a deadline, to the microsecond."""
+"""The controller in real time over UDP: a period a millisecond, packets received in between.
+
+Times of a report, each as a histogram:
+
+========  ============================  =================================================================
+time      from                          to
+========  ============================  =================================================================
+latency   cues arrive                   the first set-point that they moved is sent
+interval  a set-point is sent           the next one is; the deviation from the period: jitter
+wake      a period should begin         it begins
+period    it begins                     its set-point is sent
+decision  a time step begins            policy and machine have taken it
+========  ============================  =================================================================
+"""
 
 from __future__ import annotations
 
@@ -16,24 +29,26 @@ from .packets import LARGEST, NO_SEQUENCE, Format
 from .timing import Histogram, Pace
 
 _SPIN: Final = 100_000
-"""Before a deadline, ns, in which the socket is asked again and again: the system wakes nobody so exactly."""
+"""Time before a deadline in which the socket is polled, ns: the system does not wake a process so exactly."""
 
-_MOST_WAITING: Final = 32
-"""Datagrams that are taken after the deadline: a flood must not stop the clock."""
+_LATE_DATAGRAMS: Final = 32
+"""Most datagrams received after the deadline: a flood must not stop the clock."""
+
+_NS: Final = 1e-9
 
 
 class Endpoint:
-    """Sends and receives datagrams; what the network refuses is lost, as datagrams are.
+    """A UDP socket that receives until a deadline; a datagram that the network refuses is lost.
 
     Args:
-        address: Host and port to listen at; port 0 for any that is free.
+        address: Host and port to bind; port 0 for any that is free.
 
     Attributes:
-        address: Host and port it listens at.
-        unsent: Datagrams the network refused.
+        address: Host and port it is bound to.
+        unsent: Datagrams that the network refused.
 
     Raises:
-        ConfigurationError: the address is none of this machine's, or taken.
+        ConfigurationError: the address is not one of this computer, or taken.
     """
 
     def __init__(self, address: Address) -> None:
@@ -50,7 +65,7 @@ class Endpoint:
         self.unsent = 0
 
     def close(self) -> None:
-        """Listen no more."""
+        """Close the socket."""
         self._socket.close()
 
     def send(self, data: bytes, to: Address) -> None:
@@ -66,14 +81,14 @@ class Endpoint:
         take: Callable[[bytes, Address, int], object],
         clock: Callable[[], int] = time.perf_counter_ns,
     ) -> None:
-        """Receive until a deadline, ns; after it, what has come already, but not without end.
+        """Receive until a deadline; after it, at most 32 datagrams that have arrived already.
 
         Args:
-            deadline: Of the clock.
-            take: Given each datagram, who sent it, and when it came, ns.
+            deadline: Of the clock, ns.
+            take: Called with each datagram, its sender and its arrival, ns.
             clock: Nanoseconds now.
         """
-        waiting = 0
+        late = 0
         while True:
             now = clock()
             try:
@@ -85,8 +100,8 @@ class Endpoint:
                     select.select([self._socket], [], [], 1e-9 * (deadline - now - _SPIN))
                 continue
             take(data, sender, now)
-            waiting += now >= deadline
-            if waiting >= _MOST_WAITING:
+            late += now >= deadline
+            if late >= _LATE_DATAGRAMS:
                 return
 
 
@@ -95,18 +110,18 @@ def address_of(text: str, port: int) -> Address:
 
     Args:
         text: A name or IPv4 address.
-        port: Where none is said.
+        port: Default.
 
     Raises:
-        ConfigurationError: there is no host, or none of this name, or the port is no number from 0 to 65535.
+        ConfigurationError: the host is missing or unknown, or the port is no number from 0 to 65535.
     """
-    host, colon, said = text.partition(":")
-    if colon and not (said.isascii() and said.isdigit()):
+    host, colon, digits = text.partition(":")
+    if colon and not (digits.isascii() and digits.isdigit()):
         raise ConfigurationError(f"{text}: a port is a number, as in 127.0.0.1:{port}")
     if not host:
         # The system would take it for 0.0.0.0, every address of this machine.
         raise ConfigurationError(f"{text!r}: name a host, as in 127.0.0.1:{port}")
-    number = int(said) if colon else port
+    number = int(digits) if colon else port
     if number > 65535:
         raise ConfigurationError(f"{text}: a port is at most 65535")
     try:
@@ -120,28 +135,20 @@ def is_loopback(address: Address) -> bool:
     return ipaddress.ip_address(address[0]).is_loopback
 
 
-# The controller in real time: a period a millisecond, packets in between.
-
-
-_NS: Final = 1e-9
-
-
 class Server:
-    """Runs a controller at the times of a pace.
+    """Runs a controller at absolute deadlines.
 
     Args:
         controller: The controller.
-        endpoint: Where packets come and set-points go.
-        form: How set-points are written.
+        endpoint: Receives cues, and sends set-points to the sender of the newest.
+        form: Wire format.
         rate: Periods a second.
-        lead: How long before its first period a time step is decided, s.
+        lead: Time before its first period at which a time step is decided, s; at most a period.
         clock: Nanoseconds now, as of the endpoint.
 
     Attributes:
-        timings: By name: "latency" from the arrival of cues until the first set-point they moved is sent;
-            "interval" between set-points, as its deviation from the period; "wake" from a period's time to
-            its begin; "period" from there until its set-point is sent; "decision" a step of policy and
-            machine.
+        timings: Histograms by name, see the table of the module.
+        pace: Of the periods.
         duration: Of the run, s.
     """
 
@@ -165,10 +172,10 @@ class Server:
         self._answered = NO_SEQUENCE
 
     def run(self, ends: Callable[[float], bool]) -> None:
-        """Go on until the controller has come home after it was stopped.
+        """Run until the controller was stopped and has returned to neutral.
 
         Args:
-            ends: Given the seconds since the begin, before each step: whether it is to be stopped.
+            ends: Called before each time step with the seconds since the begin; whether to stop.
         """
         controller, clock = self._controller, self._clock
         self.pace = pace = Pace(self._rate, clock)
@@ -178,16 +185,13 @@ class Server:
                 self._endpoint.listen(pace.deadline - self._lead, self._take)
                 if ends(_NS * (clock() - begin)):
                     controller.stop()
-                self._decide()
+                began = clock()
+                controller.decide(_NS * began)
+                self.timings["decision"].add(clock() - began)
             self._endpoint.listen(pace.deadline, self._take)
             self._period(pace.deadline)
             pace.done()
         self.duration = _NS * (clock() - begin)
-
-    def _decide(self) -> None:
-        began = self._clock()
-        self._controller.decide(_NS * began)
-        self.timings["decision"].add(self._clock() - began)
 
     def _take(self, data: bytes, sender: Address, now: int) -> None:
         self._controller.inbox.take(data, sender, _NS * now)

@@ -1,6 +1,16 @@
-"""What the controller does next: run, hold the last cues, brake to neutral, or wait there.
+"""Watchdog of the real-time loop: which state the controller takes next, and how it brakes to neutral.
 
-Pure: a state and a situation give the next state. No clock, no machine, no socket.
+=======  ======  ===================================  ==============================================
+state    number  moved by                             ends when
+=======  ======  ===================================  ==============================================
+neutral  0       nothing: it rests at its start pose  cues have arrived for ``steady`` without a gap
+running  1       the policy, with the newest cues     the newest cues are older than ``overdue``
+holding  2       the policy, with the last cues       cues arrive again, or are older than ``hold``
+braking  3       a damped spring to the start pose    the machine rests there
+=======  ======  ===================================  ==============================================
+
+Running and holding also end, in braking, when the policy fails or the controller is stopped. Nothing here
+knows a clock or a socket.
 """
 
 from __future__ import annotations
@@ -17,30 +27,36 @@ from ..envs.platform.kernels.step import TURNTABLE
 from ..envs.settings import NonNegative, Positive, configuration
 from ..envs.task.observation import acceleration_scale
 
+Floats = NDArray[np.float64]
+
+_AT_REST: Final = 0.01
+"""Largest distance and speed of an axis at rest at the start pose, m, rad, m/s, rad/s."""
+
 
 class State(IntEnum):
-    """What the controller does."""
+    """State of the controller; the table of the module says more."""
 
     NEUTRAL = 0
-    """The machine rests at its start pose, and waits for cues."""
     RUNNING = 1
-    """The policy moves it."""
     HOLDING = 2
-    """Cues are overdue: the policy moves it with the last ones."""
     BRAKING = 3
-    """It brakes and goes to its start pose, whatever the policy says."""
+
+    @property
+    def follows(self) -> bool:
+        """Whether the policy moves the machine."""
+        return self in (State.RUNNING, State.HOLDING)
 
 
 @configuration
-class Patience:
-    """How long the watchdog bears what.
+class WatchdogOptions:
+    """Time limits of the watchdog.
 
     Args:
         overdue: Age of the newest cues from which they are held, s.
         hold: Age from which the machine brakes, s.
-        stale: Delay on the way, beyond the least seen, from which a packet is too old to be used, s.
-        steady: How long cues must have come without a gap before the policy begins, s.
-        fade: Time in which the cues come in once it has begun, s; before, the car is taken to stand.
+        stale: Delay on the way, beyond the least one so far, from which a packet is too old to be used, s.
+        steady: How long cues must have arrived without a gap before the policy begins, s.
+        fade: Time in which the cues fade in from those of a standing car once it has begun, s.
     """
 
     overdue: Positive = 0.03
@@ -57,91 +73,82 @@ class Patience:
 
 
 class Situation(NamedTuple):
-    """What the watchdog looks at.
+    """Inputs of the watchdog.
 
     Args:
         age: Of the newest cues, s; infinite before any.
-        steady: How long cues have come without a gap, s.
-        home: Whether the machine rests at its start pose.
-        faulted: Whether the policy has failed; it is not asked again.
-        stopping: Whether the controller is asked to end.
+        steady: How long cues have arrived without a gap, s.
+        neutral: Whether the machine rests at its start pose.
+        failed: Whether the policy has failed; it is not called again.
+        stopping: Whether the controller is to end.
     """
 
     age: float
     steady: float
-    home: bool
-    faulted: bool
+    neutral: bool
+    failed: bool
     stopping: bool
 
 
-def next_state(state: State, situation: Situation, patience: Patience) -> State:
+def next_state(state: State, situation: Situation, options: WatchdogOptions) -> State:
     """The state for the next step.
 
-    A policy begins only where it always begins, with the machine at rest at its start pose: so a machine that
-    brakes goes there first, also when cues come again.
+    A policy begins only with the machine at rest at its start pose. So a machine that brakes returns there
+    first, also when cues arrive again.
     """
-    ends = situation.faulted or situation.stopping
-    if state in (State.RUNNING, State.HOLDING):
-        if ends or situation.age > patience.hold:
+    ends = situation.failed or situation.stopping
+    if state.follows:
+        if ends or situation.age > options.hold:
             return State.BRAKING
-        return State.HOLDING if situation.age > patience.overdue else State.RUNNING
-    if not situation.home:
+        return State.HOLDING if situation.age > options.overdue else State.RUNNING
+    if not situation.neutral:
         return State.BRAKING
-    fresh = situation.age <= patience.overdue and situation.steady >= patience.steady
+    fresh = situation.age <= options.overdue and situation.steady >= options.steady
     return State.RUNNING if fresh and not ends else State.NEUTRAL
 
 
-# The way home: accelerations that bring the machine to rest at its start pose, whatever it did before.
-
-
-Floats = NDArray[np.float64]
-
-_ARRIVED: Final = 0.01
-"""Distance and speed of each axis that count as none, m, rad, m/s, rad/s."""
-
-
 @configuration
-class HomingOptions:
-    """How the machine goes home.
+class BrakeOptions:
+    """How the machine brakes to neutral.
 
     Args:
         frequency: Of the spring to the start pose, critically damped, rad/s.
-        share: Of the largest acceleration of each axis alone that it uses at most.
+        share: Largest share of each axis' own acceleration limit that it uses.
     """
 
     frequency: Positive = 1.0
     share: Positive = 0.5
 
 
-class Homing:
-    """A spring on each axis, critically damped: it brakes first, and then goes home.
+class BrakeToNeutral:
+    """Return to the start pose: a critically damped spring on each axis, with bounded acceleration.
 
     Args:
         platform: The machine.
-        start: (9,) pose to go to; a turntable without ends takes the shorter way round.
+        start: (9,) pose to return to; a turntable without end stops takes the shorter way round.
         options: How fast.
     """
 
-    def __init__(self, platform: Platform, start: Floats, options: HomingOptions) -> None:
+    def __init__(self, platform: Platform, start: Floats, options: BrakeOptions) -> None:
         self._start, self._frequency = start, options.frequency
-        self._most = options.share * acceleration_scale(platform)
-        self._round = platform.turntable is not None and platform.turntable.travel is None
+        self._largest = options.share * acceleration_scale(platform)
+        self._endless = platform.turntable is not None and platform.turntable.travel is None
 
     def accelerations(self, motion: Floats) -> Floats:
-        """(9,) m/s^2 and rad/s^2 for a motion of :class:`~.track.MotionView`."""
-        away, rate = self._away(motion)
+        """(9,) m/s^2 and rad/s^2 for a motion of :class:`~.machine.MotionView`."""
+        offset, rate = self._offset(motion)
         w = self._frequency
-        return np.asarray(np.clip(-w * w * away - 2.0 * w * rate, -self._most, self._most))
+        return np.asarray(np.clip(-w * w * offset - 2.0 * w * rate, -self._largest, self._largest))
 
-    def arrived(self, motion: Floats) -> bool:
+    def at_rest(self, motion: Floats) -> bool:
         """Whether the machine rests at the start pose."""
-        away, rate = self._away(motion)
-        return bool(np.abs(away).max() <= _ARRIVED and np.abs(rate).max() <= _ARRIVED)
+        offset, rate = self._offset(motion)
+        return bool(np.abs(offset).max() <= _AT_REST and np.abs(rate).max() <= _AT_REST)
 
-    def _away(self, motion: Floats) -> tuple[Floats, Floats]:
-        """(9,) distances from the start pose, and rates."""
+    def _offset(self, motion: Floats) -> tuple[Floats, Floats]:
+        """(9,) offsets from the start pose, and rates."""
         axes = slice(len(self._start))
-        away, rate = motion[0, axes] - self._start, motion[1, axes]
-        if self._round:
-            away[TURNTABLE] = np.remainder(away[TURNTABLE] + np.pi, 2.0 * np.pi) - np.pi
-        return away, rate
+        offset, rate = motion[0, axes] - self._start, motion[1, axes]
+        if self._endless:
+            offset[TURNTABLE] = np.remainder(offset[TURNTABLE] + np.pi, 2.0 * np.pi) - np.pi
+        return offset, rate

@@ -12,6 +12,7 @@ from ...envs.arrays import FLOAT
 from ...envs.platform import Platform, actuator_limits
 from ...envs.platform.kernels.step import LEGS
 from ...envs.platform.kinematics import leg_motion
+from ...envs.platform.limits import limits_exceeded
 from ...envs.simulator.simulator import Simulator
 from ..metrics import Criteria, cue_error
 from .batch_drivers import BatchDriver
@@ -46,9 +47,7 @@ class TrueLimits:
 
     def __init__(self, platform: Platform, n: int, dt: float) -> None:
         self._hexapod, self._dt = platform.hexapod, dt
-        limits = actuator_limits(platform)
-        self._low, self._high = limits["position_min"], limits["position_max"]
-        self._speed, self._acceleration = limits["velocity"], limits["acceleration"]
+        self._limits = actuator_limits(platform)
         self._before: Floats = np.zeros((0, n, 9))
         self.use = dict.fromkeys(_LIMITED, 0.0)
         self.clearance = 1.0
@@ -68,23 +67,18 @@ class TrueLimits:
         # A machine that begins has come from rest.
         change = np.concatenate([np.zeros((len(rate) - len(change), *rate.shape[1:])), change])
         self._before = rate[-1:].copy()
-        ends = np.where(position < 0.0, -self._low, self._high)
-        kept = {
-            "position": self._keeps("position", position, ends, self._high - self._low),
-            "rate": self._keeps("rate", rate, self._speed, self._speed),
-            "acceleration": self._keeps("acceleration", change, self._acceleration, self._acceleration),
-            "pose": (np.abs(position[..., LEGS] - told) <= TOLERANCE).all(axis=-1) & (clearance > 0.0),
-            "number": np.isfinite(position).all(axis=-1) & np.isfinite(rate).all(axis=-1),
-        }
+        limits = self._limits
+        ends = np.where(position < 0.0, -limits["position_min"], limits["position_max"])
+        largest = (ends, limits["velocity"], limits["acceleration"])
+        for name, values, limit in zip(_LIMITED, (position, rate, change), largest, strict=True):
+            share = np.divide(np.abs(values), limit, out=np.zeros_like(values), where=limit > 0.0)
+            self.use[name] = float(np.max(share, initial=self.use[name], where=np.isfinite(share)))
         self.clearance = float(np.min(clearance, initial=self.clearance, where=np.isfinite(clearance)))
-        return {name: np.logical_not(flags) for name, flags in kept.items()}
-
-    def _keeps(self, name: str, values: Floats, limit: Floats, scale: Floats) -> NDArray[np.bool_]:
-        """(steps, n) whether all actuators keep a limit; what is not a number keeps none."""
-        size = np.abs(values)
-        share = np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0)
-        self.use[name] = float(np.max(share, initial=self.use[name], where=np.isfinite(share)))
-        return np.asarray((size <= limit + TOLERANCE * scale).all(axis=-1))
+        exceeded = limits_exceeded(limits, position, rate, change, TOLERANCE)
+        holds = (np.abs(position[..., LEGS] - told) <= TOLERANCE).all(axis=-1) & (clearance > 0.0)
+        finite = np.isfinite(position).all(axis=-1) & np.isfinite(rate).all(axis=-1)
+        beyond = [np.asarray(flags.any(axis=-1)) for flags in exceeded]
+        return dict(zip(KINDS, (*beyond, np.logical_not(holds), np.logical_not(finite)), strict=True))
 
     def _actuators(self, motion: NDArray[Any]) -> tuple[Floats, Floats, Floats, Floats]:
         """Positions and rates (steps, n, 9), legs of the step (steps, n, 6), clearance (steps, n)."""

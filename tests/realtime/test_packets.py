@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 import zlib
 
 import msgpack
@@ -13,7 +14,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.realtime import packets as message_pack
 from motion_cueing.realtime.packets import MOTION, MOTION_SIZE, Cues, FloatsFormat, SetPoint, make_format
 from motion_cueing.realtime.watchdog import State
 
@@ -21,7 +21,7 @@ FORMATS = [make_format(name) for name in ("floats", "msgpack")]
 EVERY_FORMAT = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 NUMBER = st.floats(allow_nan=False)
 TRIPLE = st.tuples(NUMBER, NUMBER, NUMBER)
-CUES = st.builds(Cues, st.integers(0, 2**64 - 2), NUMBER, TRIPLE, TRIPLE)
+CUES = st.builds(Cues, st.integers(0, 2**64 - 2), NUMBER, TRIPLE, TRIPLE, st.booleans())
 MOTIONS = st.lists(NUMBER, min_size=MOTION_SIZE, max_size=MOTION_SIZE).map(np.array)
 COUNT = st.integers(0, 2**64 - 1)
 SETPOINTS = st.builds(SetPoint, st.sampled_from(State), COUNT, COUNT, NUMBER, NUMBER, NUMBER, MOTIONS)
@@ -82,6 +82,24 @@ def test_the_bytes_are_those_of_the_documentation():
     assert sorted(k for part in MOTION.values() for k in range(39)[part]) == list(range(39))
 
 
+def test_cues_of_a_paused_drive_are_of_version_2():
+    body = b"MCGC" + struct.pack("<HHQ", 2, 1, 7) + struct.pack("<7d", 1.5, 1.0, 2.0, -9.81, 0.1, 0.2, 0.3)
+    data = body + struct.pack("<I", zlib.crc32(body))
+    assert FORMATS[0].pack_cues(SOME._replace(paused=True)) == data
+    fields = msgpack.unpackb(FORMATS[1].pack_cues(SOME._replace(paused=True)))
+    assert (fields["version"], fields["paused"]) == (2, True)
+    assert "paused" not in msgpack.unpackb(FORMATS[1].pack_cues(SOME))
+    # In version 1 the field of flags had no meaning; version 3 is not known.
+    for version, paused in ((1, False), (2, True), (3, None)):
+        changed = data[:4] + struct.pack("<H", version) + data[6:-4]
+        changed += struct.pack("<I", zlib.crc32(changed))
+        if paused is None:
+            with pytest.raises(DataError, match="version 3"):
+                FORMATS[0].unpack_cues(changed)
+        else:
+            assert FORMATS[0].unpack_cues(changed) == SOME._replace(paused=paused)
+
+
 @given(bit=st.integers(0, 8 * 76 - 1))
 def test_a_turned_bit_is_found(bit):
     data = bytearray(FORMATS[0].pack_cues(SOME))
@@ -106,10 +124,6 @@ def test_what_is_wrong_is_told(change, told):
 def test_unknown_formats_and_missing_libraries_are_told(monkeypatch):
     with pytest.raises(UnknownNameError, match="Did you mean floats"):
         make_format("float")
-
-    def missing(name):
-        raise ImportError(name)
-
-    monkeypatch.setattr(message_pack, "import_module", missing)
+    monkeypatch.setitem(sys.modules, "msgpack", None)
     with pytest.raises(ConfigurationError, match=r"motion-cueing-gym\[loop\]"):
         make_format("msgpack")

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motion_cueing.realtime.inbox import KINDS, Inbox, Place, SequenceWindow
+from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.realtime.inbox import KINDS, CueBounds, Inbox, SequenceWindow
 from motion_cueing.realtime.packets import Cues, FloatsFormat
 
 FORM = FloatsFormat()
@@ -46,9 +47,33 @@ def test_each_kind_is_counted(inbox):
     assert inbox.age(now + 0.02) == pytest.approx(0.01)
     assert inbox.counts == {
         "used": 2, "malformed": 1, "not_finite": 2, "implausible": 3, "repeated": 1, "late": 1, "stale": 1,
-        "foreign": 1,
+        "foreign": 1, "paused": 0,
     }  # fmt: skip
     assert set(inbox.counts) == set(KINDS)
+
+
+def test_cues_beyond_chosen_bounds_are_not_used():
+    inbox = Inbox(FORM, STALE, GAP, bounds=CueBounds(force=30.0, rate=5.0))
+    assert inbox.take(packet(0, force=(30.0, 0.0, -9.81), rate=(0.0, 5.0, 0.0)), ONE, 0.0) == "used"
+    assert inbox.take(packet(1, force=(0.0, -30.1, -9.81)), ONE, 0.0) == "implausible"
+    assert inbox.take(packet(1, rate=(0.0, 0.0, 5.1)), ONE, 0.0) == "implausible"
+    assert inbox.newest.sequence == 0
+    with pytest.raises(ConfigurationError, match="force"):
+        CueBounds(force=0.0)
+
+
+def test_a_pause_keeps_the_sender_and_the_cues(inbox):
+    inbox.take(packet(0), ONE, 0.0)
+    for k in range(1, 101):
+        pause = Cues(k, 0.01 * k, (math.nan, 0.0, 1e9), (0.0, 0.0, 0.0), paused=True)
+        assert inbox.take(FORM.pack_cues(pause), ONE, 0.01 * k) == "paused"
+    assert inbox.paused
+    assert inbox.newest.sequence == 0
+    assert inbox.age(1.0) == 0.0
+    assert inbox.take(packet(101), OTHER, 1.01) == "foreign"
+    assert inbox.take(packet(101, time=1.01), ONE, 1.01) == "used"
+    assert not inbox.paused
+    assert inbox.lost == 0
 
 
 def test_cues_are_steady_from_the_last_gap_on(inbox):
@@ -74,7 +99,7 @@ def test_delays_that_last_are_told_for_as_long_as_they_last(inbox):
 def test_after_silence_anyone_may_begin_with_any_number(inbox):
     inbox.take(packet(1000), ONE, 0.0)
     assert inbox.take(packet(0), OTHER, 1.0) == "foreign"
-    inbox.renew()
+    inbox.reset()
     assert inbox.take(packet(0, time=-50.0), OTHER, 1.0) == "used"
     assert inbox.sender == OTHER
     assert inbox.take(packet(1001), ONE, 1.0) == "foreign"
@@ -91,20 +116,20 @@ def test_a_named_peer_is_heard_alone(peer, heard):
 
 @given(st.permutations(range(12)), st.lists(st.integers(0, 11), max_size=12), st.integers(0, 2**64 - 13))
 def test_the_window_tells_first_from_second_times(order, again, base):
-    window, seen = SequenceWindow(leap=100), set()
+    window, seen = SequenceWindow(jump=100), set()
     for number in [*order, *again]:
-        place = window.put(base + number)
-        assert (place is Place.REPEATED) == (number in seen)
+        kind = window.put(base + number)
+        assert (kind == "repeated") == (number in seen)
         if number not in seen:
-            assert (place is Place.NEW) == all(number > other for other in seen)
+            assert (kind == "used") == all(number > other for other in seen)
         seen.add(number)
         assert window.lost == len(set(range(order[0], max(seen))) - seen)
 
 
 def test_what_lies_far_behind_is_late_however_often():
-    window = SequenceWindow(leap=1000)
+    window = SequenceWindow(jump=1000)
     assert [window.put(n) for n in (0, 500, 0, 436, 437, 437)] == [
-        Place.NEW, Place.NEW, Place.LATE, Place.LATE, Place.LATE, Place.REPEATED,
+        "used", "used", "late", "late", "late", "repeated",
     ]  # fmt: skip
-    assert window.put(1501) is Place.LEAPT
+    assert window.put(1501) == "implausible"
     assert window.lost == 498

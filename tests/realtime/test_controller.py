@@ -11,21 +11,19 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import ablation_names, get_platform, platform_names
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.suite import cues_of
-from motion_cueing.realtime import ControllerOptions, Patience, State
+from motion_cueing.realtime import ControllerOptions, Cues, State, WatchdogOptions
 from motion_cueing.realtime.client import LimitCheck
-from motion_cueing.realtime.watchdog import HomingOptions
+from motion_cueing.realtime.watchdog import BrakeOptions
 
-from .loops import AT_ONCE, FLOATS, PAPER, REST, SENDER, Bench, lane_change
+from .bench import AT_ONCE, FLOATS, PAPER, REST, SENDER, Bench, lane_change
 
 TRACE = lane_change()
-HOME = 20.0
-"""Longer than the way home from anywhere, s."""
 
 
-class Going:
+class FullAcceleration:
     """Full acceleration along all axes; raises, or answers something strange, from a call on."""
 
-    name = "going"
+    name = "full"
 
     def __init__(self, strange=None, after=50) -> None:
         self.strange, self.after, self.calls = strange, after, -4
@@ -52,133 +50,170 @@ STRANGE = {
 
 def assert_within_limits(bench: Bench, platform=PAPER) -> None:
     check = LimitCheck(platform, bench.rate)
-    assert [wrong for setpoint in bench.made if (wrong := check(setpoint))] == []
+    assert [wrong for setpoint in bench.setpoints if (wrong := check(setpoint))] == []
 
 
 def states_of(bench: Bench) -> list[State]:
     """The states in the order they came."""
-    states = [setpoint.state for setpoint in bench.made]
+    states = [setpoint.state for setpoint in bench.setpoints]
     return [state for k, state in enumerate(states) if k == 0 or state is not states[k - 1]]
 
 
-def assert_at_rest_at_home(bench: Bench) -> None:
-    motion = bench.made[-1].motion
+def assert_at_rest(bench: Bench, tolerance=0.011) -> None:
+    """At the start pose, but for whole turns of the table, without speed."""
+    motion = bench.setpoints[-1].motion.copy()
+    motion[8] -= 2.0 * np.pi * np.round(motion[8] / (2.0 * np.pi))
     assert bench.controller.state is State.NEUTRAL
-    assert np.abs(motion[:8]).max() < 1e-3
-    assert np.abs(motion[9:18]).max() < 1e-3
+    assert np.abs(motion[:18]).max() < tolerance
 
 
-def test_without_cues_it_waits_at_home():
+def test_without_cues_it_waits_at_neutral():
     bench = Bench(rate=200)
     bench.wait(0.5)
     assert states_of(bench) == [State.NEUTRAL]
-    assert not np.array([setpoint.motion for setpoint in bench.made]).any()
-    assert bench.made[-1].echo == 2**64 - 1
+    assert not np.array([setpoint.motion for setpoint in bench.setpoints]).any()
+    assert bench.setpoints[-1].echo == 2**64 - 1
 
 
-def test_silence_holds_then_brakes_then_goes_home_and_cues_begin_anew():
-    bench = Bench(patience=Patience(overdue=0.03, hold=0.2, steady=0.1, fade=0.5))
-    bench.calm(0.2)
+def test_silence_holds_then_brakes_to_neutral_and_cues_begin_anew():
+    bench = Bench(watchdog=WatchdogOptions(overdue=0.03, hold=0.2, steady=0.1, fade=0.5))
+    bench.stand(0.2)
     bench.drive(TRACE)
-    moved = np.abs(bench.made[-1].motion[:9]).max()
+    moved = np.abs(bench.setpoints[-1].motion[:9]).max()
     assert moved > 0.05
-    bench.wait(HOME)
-    assert_at_rest_at_home(bench)
+    bench.settle(cues=False)
+    bench.wait(5.0)
+    assert_at_rest(bench, 1e-3)
     bench.drive(TRACE)
     assert bench.controller.state is State.RUNNING
     expected = [State.NEUTRAL, State.RUNNING, State.HOLDING, State.BRAKING]
     assert states_of(bench) == [*expected, State.NEUTRAL, State.RUNNING]
-    held = sum(setpoint.state is State.HOLDING for setpoint in bench.made)
+    held = sum(setpoint.state is State.HOLDING for setpoint in bench.setpoints)
     assert held == pytest.approx(100 * (0.2 - 0.03), abs=1.5)
     assert_within_limits(bench)
     assert bench.trajectory().metadata["loop_holding"] == str(held)
 
 
-def test_a_machine_that_brakes_goes_home_before_it_follows_again():
-    bench = Bench(Going(), AT_ONCE)
-    bench.calm(1.0)
+def test_a_machine_that_brakes_returns_before_it_follows_again():
+    bench = Bench(FullAcceleration(), AT_ONCE)
+    bench.stand(1.0)
     bench.wait(0.3)
     assert bench.controller.state is State.BRAKING
-    bench.calm(HOME)
-    states = states_of(bench)
-    assert states == [State.RUNNING, State.HOLDING, State.BRAKING, State.RUNNING]
-    again = next(k for k in range(200, len(bench.made)) if bench.made[k].state is State.RUNNING)
-    assert np.abs(bench.made[again - 1].motion[:18]).max() < 0.011
+    while bench.controller.state is State.BRAKING:
+        bench.stand(0.01)
+    assert states_of(bench) == [State.RUNNING, State.HOLDING, State.BRAKING, State.RUNNING]
+    again = next(k for k in range(200, len(bench.setpoints)) if bench.setpoints[k].state is State.RUNNING)
+    assert np.abs(bench.setpoints[again - 1].motion[:18]).max() < 0.011
     assert_within_limits(bench)
 
 
 def test_cues_fade_in_when_the_policy_begins():
-    bench = Bench(patience=Patience(steady=0.0, fade=0.5))
+    bench = Bench(watchdog=WatchdogOptions(steady=0.0, fade=0.5))
     for _ in range(100):
         bench.send(force=(1.0, 0.0, -9.81), rate=(0.0, 0.0, 0.2))
         bench.step()
-    wanted = bench.trajectory()
-    np.testing.assert_allclose(wanted.f_reference[:, 0], np.minimum(np.arange(100) / 50, 1.0), atol=1e-12)
+    logged = bench.trajectory()
+    np.testing.assert_allclose(logged.f_reference[:, 0], np.minimum(np.arange(100) / 50, 1.0), atol=1e-12)
     np.testing.assert_allclose(
-        wanted.w_reference[:, 2], 0.2 * np.minimum(np.arange(100) / 50, 1.0), atol=1e-12
+        logged.w_reference[:, 2], 0.2 * np.minimum(np.arange(100) / 50, 1.0), atol=1e-12
     )
-    np.testing.assert_allclose(wanted.f_reference[:, 2], -9.81)
+    np.testing.assert_allclose(logged.f_reference[:, 2], -9.81)
+
+
+@pytest.mark.parametrize("fade", [0.0, 0.5])
+def test_cues_fade_out_when_the_drive_pauses_and_in_when_it_goes_on(fade):
+    bench = Bench(watchdog=WatchdogOptions(steady=0.0, fade=fade))
+    for k in range(300):
+        paused = 100 <= k < 200
+        # What a menu sends means nothing.
+        bench.send((9.0, -9.0, 0.0) if paused else (1.0, 0.0, -9.81), (0.0, 0.0, 0.2), paused)
+        bench.step()
+    fractions = [[0, 0], [99, 1.0], [199, 0.0], [200, 0.0], [299, 1.0]]
+    if fade:
+        fractions += [[25, 0.5], [100, 0.98], [124, 0.5], [225, 0.5]]
+    else:
+        fractions[0][1] = fractions[3][1] = 1.0
+    steps, shares = np.array(fractions).T
+    logged = bench.trajectory()
+    np.testing.assert_allclose(logged.f_reference[steps.astype(int), 0], shares, atol=1e-12)
+    np.testing.assert_allclose(logged.w_reference[steps.astype(int), 2], 0.2 * shares, atol=1e-12)
+    np.testing.assert_allclose(logged.f_reference[:, 1:], np.tile([0.0, -9.81], (300, 1)))
+    assert states_of(bench) == [State.RUNNING]
+    assert bench.setpoints[150].echo == 99
+
+
+def test_a_pause_is_not_felt_as_a_jerk():
+    def largest_jerk(pause):
+        bench = Bench(watchdog=WatchdogOptions(steady=0.0, fade=1.0))
+        bench.drive(lane_change(4.0))
+        for _ in range(pause):
+            bench.send((0.0, 0.0, 0.0), paused=True)
+            bench.step()
+        bench.drive(lane_change(4.0))
+        return np.abs(np.diff(bench.trajectory().f_simulator, axis=0)).max() / 0.01
+
+    assert largest_jerk(pause=200) < 2.0 * largest_jerk(pause=0)
 
 
 @pytest.mark.parametrize("strange", STRANGE.values(), ids=STRANGE)
-def test_a_policy_that_fails_is_not_asked_again(strange):
-    policy = Going(strange)
+def test_a_policy_that_fails_is_not_called_again(strange):
+    policy = FullAcceleration(strange)
     bench = Bench(policy)
-    bench.calm(HOME)
+    bench.settle()
+    bench.stand(0.2)
     assert states_of(bench) == [State.RUNNING, State.BRAKING, State.NEUTRAL]
     assert len(bench.controller.faults) == 1
     assert policy.calls == policy.after + 1
-    assert_at_rest_at_home(bench)
+    assert_at_rest(bench)
     assert_within_limits(bench)
-    assert len(bench.trajectory()) == len(bench.made)
+    assert len(bench.trajectory()) == len(bench.setpoints)
 
 
 def test_a_machine_that_would_move_to_nowhere_stays_where_it_is(monkeypatch):
-    bench = Bench(Going())
-    bench.calm(0.5)
+    bench = Bench(FullAcceleration())
+    bench.stand(0.5)
+    # Accelerations that are finite lead nowhere, so the motion is broken by hand.
     view, where = bench.machine._view, bench.machine.motion.copy()
     answers = iter([np.full((2, 15), np.nan)])
     monkeypatch.setattr(bench.machine, "_view", lambda: next(answers, view()))
-    bench.calm(0.01)
+    bench.stand(0.01)
     assert bench.controller.faults == ["the policy asked for accelerations beyond all numbers"]
     assert np.abs(bench.machine.motion[0] - where[0]).max() < 0.1
-    bench.calm(HOME)
-    assert_at_rest_at_home(bench)
+    bench.settle()
+    bench.stand(0.2)
+    assert_at_rest(bench)
     assert_within_limits(bench)
 
 
-def test_stopping_brakes_and_finishes_at_home():
-    bench = Bench(Going())
-    bench.calm(1.0)
+def test_stopping_brakes_and_finishes_at_neutral():
+    bench = Bench(FullAcceleration())
+    bench.stand(1.0)
     bench.controller.stop()
     assert not bench.controller.finished
-    bench.calm(HOME)
+    bench.settle()
     assert bench.controller.finished
     assert states_of(bench) == [State.RUNNING, State.BRAKING, State.NEUTRAL]
 
 
 def test_a_number_from_nowhere_costs_no_more_than_a_moment():
-    bench = Bench(patience=Patience(steady=0.05, fade=0.0))
-    bench.calm(0.2)
+    bench = Bench(watchdog=WatchdogOptions(steady=0.05, fade=0.0))
+    bench.stand(0.2)
     bench.sequence += 5000
     assert bench.send() == "used"
     bench.sequence -= 5000
-    bench.calm(0.5)
+    bench.stand(0.5)
     assert bench.controller.state is State.RUNNING
     assert bench.controller.inbox.counts["late"] > 0
 
 
 @pytest.mark.parametrize("name", [*platform_names(), *ablation_names()])
-def test_every_machine_comes_home_from_full_motion(name):
+def test_every_machine_returns_from_full_motion(name):
     platform = get_platform(name)
-    bench = Bench(Going(), platform=platform)
-    bench.calm(3.0)
-    assert np.abs(bench.made[-1].motion[:9]).max() > 0.02
-    bench.wait(HOME)
-    assert bench.controller.state is State.NEUTRAL
-    motion = bench.made[-1].motion
-    turned = 2.0 * np.pi * np.round(motion[8] / (2.0 * np.pi))
-    assert np.abs(motion[:9] - [0, 0, 0, 0, 0, 0, 0, 0, turned]).max() < 1e-3
+    bench = Bench(FullAcceleration(), platform=platform)
+    bench.stand(1.5)
+    assert np.abs(bench.setpoints[-1].motion[:9]).max() > 0.02
+    bench.settle(cues=False)
+    assert_at_rest(bench)
     assert_within_limits(bench, platform)
 
 
@@ -208,17 +243,15 @@ DATAGRAMS = st.lists(
 @given(
     data=DATAGRAMS, seed=st.integers(0, 2**32 - 1), scale=st.sampled_from([1.0, 10.0, 1e3, 1e6, 1e150, 1e306])
 )
-def test_no_setpoint_leaves_the_limits_whatever_comes_and_whatever_the_policy_wants(data, seed, scale):
-    from motion_cueing.realtime.packets import Cues
-
-    bench = Bench(Wild(seed, scale), Patience(steady=0.0), rate=500)
+def test_no_setpoint_leaves_the_limits_whatever_comes_and_whatever_the_policy_does(data, seed, scale):
+    bench = Bench(Wild(seed, scale), WatchdogOptions(steady=0.0), rate=500)
     for item in data:
         if isinstance(item, tuple):
             sequence, time, cues = item
             item = FLOATS.pack_cues(Cues(sequence, time, tuple(cues[:3]), tuple(cues[3:])))
         bench.controller.inbox.take(item, SENDER, bench.now)
         bench.wait(0.03)
-    bench.controller.inbox.renew()
+    bench.controller.inbox.reset()
     for _ in range(150):
         bench.send(*2 * [REST])
         bench.wait(0.01)
@@ -245,6 +278,6 @@ def test_a_rate_that_does_not_fit_the_policies_is_refused(rate):
         ControllerOptions(rate=rate)
 
 
-def test_the_way_home_is_as_gentle_as_told():
+def test_a_brake_without_acceleration_is_refused():
     with pytest.raises(ConfigurationError, match="share"):
-        HomingOptions(share=0.0)
+        BrakeOptions(share=0.0)
