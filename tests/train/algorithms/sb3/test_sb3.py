@@ -12,7 +12,7 @@ from stable_baselines3.common.type_aliases import TrainFreq
 from torch import nn
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.train.algorithms.sb3.learner import CLASSES, arguments
+from motion_cueing.train.algorithms.sb3.sb3 import CLASSES, arguments
 from motion_cueing.train.config import load_config
 
 

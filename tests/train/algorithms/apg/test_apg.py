@@ -11,8 +11,8 @@ import yaml
 
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.train.agents import Agent, Record
-from motion_cueing.train.algorithms.apg.gradients import ThroughTime
-from motion_cueing.train.algorithms.apg.learner import GradientLearner
+from motion_cueing.train.algorithms.apg.apg import ApgLearner
+from motion_cueing.train.algorithms.apg.backpropagation import Rollout
 from motion_cueing.train.config import TrainingConfig, load_config
 from motion_cueing.train.registry import StopTraining
 
@@ -50,17 +50,17 @@ def nothing() -> None:
     """A boundary where nothing is due."""
 
 
-def cost(learner: GradientLearner) -> float:
+def cost(learner: ApgLearner) -> float:
     """Mean cost of the actor as it is, over the same episodes each time."""
     learner.batch.seed(np.ones(learner.batch.n, dtype=bool), list(range(100, 100 + learner.batch.n)))
     learner.batch.begin(np.ones(learner.batch.n, dtype=bool))
     learner._unroll.begin()
-    ThroughTime(learner._unroll, learner.actor)
+    Rollout(learner._unroll, learner.actor)
     return float(learner._unroll.costs.mean())
 
 
 def test_a_training_lowers_the_cost(config):
-    learner = GradientLearner(replace(config, steps=4 * config.steps))
+    learner = ApgLearner(replace(config, steps=4 * config.steps))
     before = cost(learner)
     learner.learn(nothing)
     told = learner.scalars()
@@ -72,10 +72,10 @@ def test_a_training_lowers_the_cost(config):
 
 def test_one_that_is_resumed_ends_with_the_same_bits(either):
     config = either
-    whole = GradientLearner(config)
+    whole = ApgLearner(config)
     whole.learn(nothing)
 
-    first = GradientLearner(config)
+    first = ApgLearner(config)
 
     def stop() -> None:
         if first.steps >= config.steps // 2:
@@ -83,7 +83,7 @@ def test_one_that_is_resumed_ends_with_the_same_bits(either):
 
     with pytest.raises(StopTraining):
         first.learn(stop)
-    second = GradientLearner(config)
+    second = ApgLearner(config)
     second.restore(first.state())
     second.learn(nothing)
     for a, b in zip(whole.network().weights, second.network().weights, strict=True):
@@ -91,7 +91,7 @@ def test_one_that_is_resumed_ends_with_the_same_bits(either):
 
 
 def test_the_network_is_the_actor(config):
-    learner = GradientLearner(config)
+    learner = ApgLearner(config)
     observation = np.random.default_rng(0).normal(size=(50, learner.batch.layout.size)).astype(np.float32)
     with torch.no_grad():
         expected = learner.actor(torch.from_numpy(observation)).numpy()
@@ -100,7 +100,7 @@ def test_the_network_is_the_actor(config):
 
 def test_it_begins_as_a_spring_and_damper(config):
     """At rest and at neutral next to nothing is asked for; off neutral, the way back."""
-    learner = GradientLearner(config)
+    learner = ApgLearner(config)
     layout = learner.batch.layout
     still, moved = np.zeros((2, layout.size), dtype=np.float32)
     moved[layout.first("carriage")] = 0.5
@@ -110,18 +110,18 @@ def test_it_begins_as_a_spring_and_damper(config):
 
 
 def test_it_goes_on_from_an_agent(config, tmp_path):
-    learner = GradientLearner(config)
+    learner = ApgLearner(config)
     record = Record(
         algo="apg", seed=0, command="", steps=0, wall_time=0.0, hardware="", versions={}, created=""
     )
     path = tmp_path / "first.safetensors"
     Agent("first", config.task, learner.network(), record).save(path)
-    second = GradientLearner(replace(config, seed=5, initial=str(path)))
+    second = ApgLearner(replace(config, seed=5, initial=str(path)))
     seen = np.random.default_rng(1).normal(size=(20, learner.batch.layout.size)).astype(np.float32)
     np.testing.assert_allclose(second.network()(seen), learner.network()(seen), atol=1e-5)
     other = replace(config.task, action=replace(config.task.action, repeat=4))
     with pytest.raises(ConfigurationError, match=r"its task\.action"):
-        GradientLearner(replace(config, task=other, initial=str(path)))
+        ApgLearner(replace(config, task=other, initial=str(path)))
 
 
 @pytest.mark.parametrize(
@@ -134,27 +134,27 @@ def test_it_goes_on_from_an_agent(config, tmp_path):
 )
 def test_what_it_cannot_do_is_told(config, change, told):
     with pytest.raises(ConfigurationError, match=told):
-        GradientLearner(replace(config, **change))
+        ApgLearner(replace(config, **change))
 
 
 def test_windows_go_on_where_they_ended(config):
     """Two windows of half an episode drive as one of the whole, with a policy that stays."""
-    learner = GradientLearner(replace(config, hyperparameters={**config.hyperparameters, **WINDOWS}))
+    learner = ApgLearner(replace(config, hyperparameters={**config.hyperparameters, **WINDOWS}))
     learner._left[:] = 0
     learner._rounds = 1
     costs = []
     for _ in range(2):
-        learner._go_on()
-        ThroughTime(learner._unroll, learner.actor)
+        learner._next_window()
+        Rollout(learner._unroll, learner.actor)
         costs.append(learner._unroll.costs)
     assert (learner._left == 0).all()
-    whole = GradientLearner(config)
+    whole = ApgLearner(config)
     whole.actor.load_state_dict(learner.actor.state_dict())
-    whole._go_on()
-    ThroughTime(whole._unroll, whole.actor)
+    whole._next_window()
+    Rollout(whole._unroll, whole.actor)
     np.testing.assert_allclose(np.concatenate(costs), whole._unroll.costs, rtol=1e-12)
 
 
 def test_a_window_that_does_not_go_into_an_episode_is_refused(config):
     with pytest.raises(ConfigurationError, match=r"window 0\.3 must be a whole part"):
-        GradientLearner(replace(config, hyperparameters={"window": 0.3}))
+        ApgLearner(replace(config, hyperparameters={"window": 0.3}))

@@ -1,4 +1,7 @@
-"""A washout that is linear in the observation: what the network of an agent can begin as.
+"""The best linear washout for random drives, by CMA-ES: a few gains, not a network's thousands of weights.
+
+Every generation tries its candidates at once, each in the same episodes. The agent is a network whose hidden
+layers are silent, so that ``apg`` can go on from it. The washout is linear in the observation.
 
 In the cab's frame, with the errors of specific force f and angular velocity omega, the low-passes f_j of the
 car's specific force (the observation's memory), and the acceleration a of the action before:
@@ -11,7 +14,7 @@ car's specific force (the observation's memory), and the acceleration a of the a
     turntable  a <- yaw_gain (omega_car - omega)
 
 The hexapod's yaw is led back to neutral, critically damped. It high-passes what carriage and hexapod can
-follow and tilts for what lasts, as any washout, and corrects itself by what is felt.
+follow and tilts for what lasts, as any washout, and corrects itself by the simulator's cue.
 """
 
 from __future__ import annotations
@@ -36,8 +39,8 @@ from ....envs.task.observation import Layout
 from ....envs.task.options import PositiveCount
 from ...agents import Network
 from ...config import TrainingConfig
-from ...networks import TORCH_ACTIVATIONS, Actor, begin_as
-from ...registry import Boundary, State, restoring
+from ...networks import TORCH_ACTIVATIONS, Actor, start_linear
+from ...registry import Boundary, Learner, State, restoring
 
 Floats = NDArray[np.float64]
 
@@ -212,22 +215,16 @@ class _Writer:
         self._add(axis, rate, k, -2.0 * damping * frequency * strength)
 
 
-# The best linear washout for random drives, by CMA-ES: a few gains, not a network's thousands of weights.
-#
-# Every generation tries its candidates all at once, each in the same episodes. The agent is a network whose
-# hidden layers are silent, so a training by gradients can go on from it.
-
-
 @configuration
 class LinearHyperparameters:
-    """What the search is given.
+    """Hyperparameters of the search.
 
     Args:
         start: The gains it begins with.
         sigma: Standard deviation of its first generation, in logarithms of gains and in shares.
         population: Candidates of a generation.
         offset: The cost of an episode counts as log(offset + cost), as for apg.
-        net_arch: Entries of each hidden layer of the network, which are silent.
+        net_arch: Units of each hidden layer of the network, which are silent.
         activation_fn: Of the hidden layers.
     """
 
@@ -239,13 +236,8 @@ class LinearHyperparameters:
     activation_fn: Annotated[str, Field(pattern="|".join(TORCH_ACTIVATIONS))] = "elu"
 
 
-def make_learner(config: TrainingConfig) -> LinearLearner:
-    """The learner of a configuration."""
-    return LinearLearner(config)
-
-
-class LinearLearner:
-    """See :class:`~.learner.Learner`.
+class LinearLearner(Learner):
+    """See :class:`~...registry.Learner`.
 
     Args:
         config: The training; every candidate drives ``n_envs`` episodes of ``task.episode.duration``.
@@ -269,31 +261,31 @@ class LinearLearner:
         begin = coordinates(self.given.start, len(config.task.observation.memory))
         options = {"seed": config.seed + 1, "popsize": self.given.population, "verbose": -9}
         self._search = cma.CMAEvolutionStrategy(begin, self.given.sigma, options)
-        self._told: list[list[float]] = []
+        self._values: list[list[float]] = []
         self._best, self._least = begin, math.inf
         self._costs = np.zeros((0, 0))
 
     @property
     def steps(self) -> int:
         """Actions so far."""
-        return len(self._told) * self._length * self.batch.n
+        return len(self._values) * self._length * self.batch.n
 
     def learn(self, boundary: Boundary) -> None:
         """Search until the configuration's steps, or a boundary raises :class:`StopTraining`."""
         while self.steps < self._total:
             boundary()
             points = self._search.ask()
-            self._tell(points, self._tried(points))
+            self._record(points, self._evaluate(points))
 
-    def _tell(self, points: list[Floats], values: list[float]) -> None:
+    def _record(self, points: list[Floats], values: list[float]) -> None:
         self._search.tell(points, values)
-        self._told.append(values)
+        self._values.append(values)
         least = int(np.argmin(values))
         if values[least] < self._least:
             self._best, self._least = np.array(points[least]), values[least]
 
-    def _tried(self, points: list[Floats]) -> list[float]:
-        """What each candidate costs, in the same episodes of every generation."""
+    def _evaluate(self, points: list[Floats]) -> list[float]:
+        """Cost of each candidate, in the same episodes of every generation."""
         batch, arrays = self.batch, self.batch.arrays
         matrices = np.array([self._gains(point) for point in points])
         batch.seed(self._everywhere, self._seeds * len(points))
@@ -301,8 +293,8 @@ class LinearLearner:
         batch.observe(self._everywhere)
         costs = np.zeros(batch.n)
         for _ in range(self._length):
-            seen = arrays.observation.pull().reshape(len(points), self._each, -1)
-            action = np.tanh(np.einsum("pes,pas->pea", seen, matrices))
+            observation = arrays.observation.pull().reshape(len(points), self._each, -1)
+            action = np.tanh(np.einsum("pes,pas->pea", observation, matrices))
             batch.write(action.reshape(batch.n, -1))
             batch.step()
             costs -= arrays.reward.pull()
@@ -321,25 +313,25 @@ class LinearLearner:
 
     def scalars(self) -> dict[str, float]:
         """Of the last generation, and the best so far."""
-        told = {"train/sigma": float(self._search.sigma)}
-        if self._told:
-            told |= {"rollout/reward": -float(self._costs.mean(axis=1).min()), "train/least": self._least}
-        return told
+        scalars = {"train/sigma": float(self._search.sigma)}
+        if self._values:
+            scalars |= {"rollout/reward": -float(self._costs.mean(axis=1).min()), "train/least": self._least}
+        return scalars
 
     def network(self) -> Network:
         """The best gains so far as a network."""
-        begin_as(self.actor, self._gains(self._best))
+        start_linear(self.actor, self._gains(self._best))
         return self.actor.network()
 
     def state(self) -> dict[str, Any]:
-        """What each generation came to; the search is repeated from it."""
-        return {"told": [list(values) for values in self._told]}
+        """Values of each generation; the search is repeated from them."""
+        return {"told": [list(values) for values in self._values]}
 
     def restore(self, state: State) -> None:
         """Go on from a state, bit for bit."""
         with restoring():
             for values in state["told"]:
-                self._tell(self._search.ask(), [float(value) for value in values])
+                self._record(self._search.ask(), [float(value) for value in values])
 
 
 def _check(config: TrainingConfig) -> None:

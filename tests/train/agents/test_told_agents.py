@@ -17,15 +17,15 @@ from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.drives import machines_of
 from motion_cueing.envs.task.observation import MACHINE, abilities, ability_of, acceleration_scale
 from motion_cueing.train.agents.export import export_onnx
-from motion_cueing.train.algorithms.apg.learner import GradientLearner
-from motion_cueing.train.algorithms.dagger.learner import Teacher
+from motion_cueing.train.algorithms.apg.apg import ApgLearner
+from motion_cueing.train.algorithms.dagger.dagger import Teacher
 from motion_cueing.train.config import load_config, validation_task
-from motion_cueing.train.networks import Actor, begin_at_rest, standardize
+from motion_cueing.train.networks import Actor, normalize_by_rollout, start_as_spring_damper
 from motion_cueing.train.validation import Validation
 
-from ..env.tasks import drive
-from . import tiny
-from .agents import agent
+from ...env.tasks import drive
+from .. import tiny
+from . import agent
 
 BUILD = {"travel": [0.5, 1.0], "size": [0.4, 1.0], "without_carriage": 0.4, "without_turntable": 0.4}
 TOLD = {
@@ -42,7 +42,7 @@ def told(**fields) -> TaskOptions:
 def test_a_spring_begins_on_machines_that_all_can_move():
     batch = Batch(8, told(), drives=[drive()])
     actor = Actor(batch.layout.size, 9, (8,))
-    begin_at_rest(actor, batch)
+    start_as_spring_damper(actor, batch)
     rows, gains = batch.layout.slices, actor.network().weights[-1][:, 8:]
     # -w^2 x with w = 0.3 rad/s, a unit of the row being 10 m, as a share of the usual scale.
     assert gains[0, rows["carriage"].start] == pytest.approx(-0.09 * 10.0 / batch.usual_scale[0], rel=1e-6)
@@ -56,8 +56,8 @@ def test_what_a_machine_can_do_gets_a_standard_that_others_fit_in():
     everywhere = np.ones(2, dtype=bool)
     batch.seed(everywhere, [0, 1])
     actor = Actor(batch.layout.size, 9, (8,))
-    begin_at_rest(actor, batch)
-    standardize(actor, batch, 10)
+    start_as_spring_damper(actor, batch)
+    normalize_by_rollout(actor, batch, 10)
     for platform in map(get_platform, platform_names()):
         first = batch.layout.first(MACHINE[0].name)
         seen = torch.zeros(batch.layout.size)
@@ -79,7 +79,7 @@ def test_validation_drives_machines_that_are_not_trained_on(tmp_path):
 
 def test_it_learns_on_several_machines(tmp_path):
     task = {**TOLD, "episode": {"library": 2, "drive_duration": 6.0, "duration": 0.5, "random_start": True}}
-    learner = GradientLearner(tiny.config(tmp_path, "apg", task=task, steps=4 * 10 * 4))
+    learner = ApgLearner(tiny.config(tmp_path, "apg", task=task, steps=4 * 10 * 4))
     before = learner.network()
     learner.learn(lambda: None)
     assert len(set(learner.batch.simulator.platform_of.tolist())) > 1

@@ -14,7 +14,7 @@ from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.train.agents import Agent, Network
 
-from .agents import RECORD, agent, network
+from . import RECORD, agent, network
 
 EXACT = {
     "tanh": np.tanh,

@@ -16,8 +16,8 @@ from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.task import ActionOptions, EpisodeOptions, TaskOptions
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.evaluation import rollout
-from motion_cueing.train.algorithms.apg.learner import GradientLearner
-from motion_cueing.train.algorithms.dagger.learner import ImitationLearner, Teacher, rest_of
+from motion_cueing.train.algorithms.apg.apg import ApgLearner
+from motion_cueing.train.algorithms.dagger.dagger import DaggerLearner, Teacher, rest_of
 from motion_cueing.train.config import TrainingConfig, load_config
 from motion_cueing.train.registry import StopTraining
 
@@ -113,7 +113,7 @@ def test_one_that_is_told_the_drive_is_told_what_is_left_of_it():
 
 
 def test_the_pupil_learns_what_the_teacher_does(config):
-    learner = ImitationLearner(replace(config, steps=2 * config.steps))
+    learner = DaggerLearner(replace(config, steps=2 * config.steps))
     learner._drive()
     seen, told = learner._seen[0], learner._told[0]
     with torch.no_grad():
@@ -126,7 +126,7 @@ def test_the_pupil_learns_what_the_teacher_does(config):
 
 
 def test_the_teacher_drives_less_and_less(config):
-    learner = ImitationLearner(config)
+    learner = DaggerLearner(config)
     shares = []
 
     def note() -> None:
@@ -139,10 +139,10 @@ def test_the_teacher_drives_less_and_less(config):
 
 
 def test_one_that_is_resumed_ends_with_the_same_bits(config):
-    whole = ImitationLearner(config)
+    whole = DaggerLearner(config)
     whole.learn(nothing)
 
-    first = ImitationLearner(config)
+    first = DaggerLearner(config)
 
     def stop() -> None:
         if first.steps >= config.steps // 2:
@@ -150,7 +150,7 @@ def test_one_that_is_resumed_ends_with_the_same_bits(config):
 
     with pytest.raises(StopTraining):
         first.learn(stop)
-    second = ImitationLearner(config)
+    second = DaggerLearner(config)
     second.restore(first.state())
     second.learn(nothing)
     for a, b in zip(whole.network().weights, second.network().weights, strict=True):
@@ -158,9 +158,9 @@ def test_one_that_is_resumed_ends_with_the_same_bits(config):
 
 
 def test_the_gradient_goes_on_from_its_network(config):
-    learner = ImitationLearner(config)
+    learner = DaggerLearner(config)
     given = {"net_arch": [16]}
-    other = GradientLearner(replace(config, algo="apg", hyperparameters=given))
+    other = ApgLearner(replace(config, algo="apg", hyperparameters=given))
     other.actor.load(learner.network())
     observation = torch.randn(5, learner.batch.layout.size)
     with torch.no_grad():
@@ -180,9 +180,9 @@ def test_what_it_cannot_do_is_refused(tmp_path, fields, message):
     path = tmp_path / "wrong.yaml"
     path.write_text(yaml.safe_dump(fields), encoding="utf-8")
     with pytest.raises(ConfigurationError, match=message):
-        ImitationLearner(load_config("dagger", path))
+        DaggerLearner(load_config("dagger", path))
 
 
 def test_an_unknown_teacher_is_refused(config):
     with pytest.raises(UnknownNameError, match="nobody"):
-        ImitationLearner(replace(config, hyperparameters={"teacher": "nobody"}))
+        DaggerLearner(replace(config, hyperparameters={"teacher": "nobody"}))

@@ -21,7 +21,7 @@ from motion_cueing.train.config import (
     recipe_names,
     validation_task,
 )
-from motion_cueing.train.registry import algorithm_names, get_algorithm, preset_file
+from motion_cueing.train.registry import algorithm_names, preset_of
 
 from . import tiny
 
@@ -31,7 +31,7 @@ def test_no_preset_trains_or_validates_on_what_is_evaluated(name):
     config = load_config(name)
     evaluated = {*maneuver_names(), *recording_names()}
     assert config.task.episode.drives == ()
-    text = preset_file(get_algorithm(name)).read_text(encoding="utf-8")
+    text = preset_of(name).read_text(encoding="utf-8")
     assert not {word for word in evaluated if word in text}
     small = {"library": 2, "drive_duration": 1.0}
     episode = load_config(name, task={**yaml.safe_load(text).get("task", {}), "episode": small}).task.episode

@@ -1,4 +1,9 @@
-"""A controller that says what it would do, in a batch of episodes that it may or may not drive."""
+"""Imitation of a controller by dataset aggregation (DAgger; Ross, Gordon and Bagnell, AISTATS 2011).
+
+Every round drives an episode in each environment. The teacher labels every action with its own, whoever
+drives: the teacher in the first rounds, then more and more the pupil. So the data hold the states into which
+the pupil's mistakes lead. The pupil is fitted to the data of all rounds by least squares.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +28,9 @@ from ....envs.task.environment import normalized
 from ....envs.task.options import PositiveCount
 from ...agents import Network
 from ...config import TrainingConfig
-from ...networks import TORCH_ACTIVATIONS, Actor, take_standard
-from ...optimizers import warm_cosine
-from ...registry import Boundary, State, restoring
-from ...training import begin
+from ...networks import TORCH_ACTIVATIONS, Actor, normalize_by
+from ...registry import Boundary, Learner, State, restoring
+from ...training import start_actor, warm_cosine
 
 Floats = NDArray[np.float64]
 
@@ -35,9 +39,9 @@ _YAW = 2
 
 
 class Teacher:
-    """A controller in every environment of a batch.
+    """A controller that labels the states of a batch of episodes, which it may or may not drive.
 
-    One that is told the drive is told what is left of it where the episode begins.
+    A controller that knows its drive is given what is left of it where the episode begins.
 
     Args:
         policy: Its name, or the YAML file of one.
@@ -56,17 +60,17 @@ class Teacher:
             )
         self._batch = batch
         self._made = make_policy(policy, batch.platform)
-        self._drivers: list[Policy] = []
+        self._controllers: list[Policy] = []
         self._states: list[Any] = []
         self._begins = True
 
     def begin(self) -> None:
         """The batch has begun an episode everywhere."""
         if isinstance(self._made, ForeknowingPolicy):
-            self._drivers = [self._made.for_drive(rest) for rest in self._rests()]
+            self._controllers = [self._made.for_drive(rest) for rest in self._rests()]
         else:
-            self._drivers = [self._made]
-        self._states = [None] * len(self._drivers)
+            self._controllers = [self._made]
+        self._states = [None] * len(self._controllers)
         self._begins = True
 
     def _rests(self) -> list[CueTrace]:
@@ -79,18 +83,18 @@ class Teacher:
     def __call__(self, rows: Floats) -> NDArray[np.float32]:
         """Actions (n, 9) in [-1, 1] of the task, for observations (n, OBSERVATION_SIZE).
 
-        To be asked once every time step, as it has a memory.
+        To be called once every time step, because the controller has a memory.
         """
-        answers = np.zeros((len(rows), N_AXES))
+        labels = np.zeros((len(rows), N_AXES))
         # One that knows its drive sees one environment, any other all of them.
-        for i, (driver, own) in enumerate(
-            zip(self._drivers, np.split(rows, len(self._drivers)), strict=True)
+        for i, (controller, own) in enumerate(
+            zip(self._controllers, np.split(rows, len(self._controllers)), strict=True)
         ):
             begins = np.full(len(own), self._begins)
-            action, self._states[i] = driver.predict(own, self._states[i], begins, deterministic=True)
-            answers[i * len(own) : (i + 1) * len(own)] = np.reshape(action, (-1, N_AXES))
+            action, self._states[i] = controller.predict(own, self._states[i], begins, deterministic=True)
+            labels[i * len(own) : (i + 1) * len(own)] = np.reshape(action, (-1, N_AXES))
         self._begins = False
-        return self._as_actions(answers)
+        return self._as_actions(labels)
 
     def _as_actions(self, accelerations: Floats) -> NDArray[np.float32]:
         batch = self._batch
@@ -129,13 +133,6 @@ def rest_of(drive: CueTrace, sample: int) -> CueTrace:
     )
 
 
-# Imitation of a controller, with dataset aggregation (DAgger; Ross, Gordon and Bagnell, AISTATS 2011).
-#
-# Every round drives an episode in each environment. At every action the teacher says what it would do there,
-# whoever drives: the teacher in the first rounds, then more and more the pupil, so that the data hold the
-# states into which its own mistakes lead. All rounds' data are learned from, by least squares.
-
-
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 _SEED_OF_ORDER: Final = 1
@@ -143,8 +140,8 @@ _SEED_OF_ORDER: Final = 1
 
 
 @configuration
-class ImitationHyperparameters:
-    """What an imitation is given.
+class DaggerHyperparameters:
+    """Hyperparameters of the imitation.
 
     Args:
         teacher: Controller to imitate, by name or YAML file. One that plans a whole drive without looking, as
@@ -155,9 +152,9 @@ class ImitationHyperparameters:
         updates: Steps of Adam after each round.
         batch_size: Samples of each.
         learning_rate: Largest, of Adam; it rises linearly in the first tenth and falls as a cosine.
-        net_arch: Entries of each hidden layer.
+        net_arch: Units of each hidden layer.
         activation_fn: Of the hidden layers.
-        max_grad_norm: Longer gradients are shortened to it.
+        max_grad_norm: Longer gradients are clipped to it.
     """
 
     teacher: str = "mpc"
@@ -171,13 +168,8 @@ class ImitationHyperparameters:
     max_grad_norm: Positive = 1.0
 
 
-def make_learner(config: TrainingConfig) -> ImitationLearner:
-    """The learner of a configuration."""
-    return ImitationLearner(config)
-
-
-class ImitationLearner:
-    """See :class:`~.learner.Learner`.
+class DaggerLearner(Learner):
+    """See :class:`~...registry.Learner`.
 
     Args:
         config: The training; ``task.episode.duration`` is the length of an episode.
@@ -188,7 +180,7 @@ class ImitationLearner:
     """
 
     def __init__(self, config: TrainingConfig) -> None:
-        self.given = from_dict(ImitationHyperparameters, dict(config.hyperparameters), "hyperparameters")
+        self.given = from_dict(DaggerHyperparameters, dict(config.hyperparameters), "hyperparameters")
         _check(config)
         torch.set_num_threads(config.threads)
         torch.manual_seed(config.seed)
@@ -205,11 +197,11 @@ class ImitationLearner:
         self.actor = Actor(
             self.batch.layout.size, self.batch.action_size, self.given.net_arch, self.given.activation_fn
         )
-        begin(self.actor, self.batch, config)
+        start_actor(self.actor, self.batch, config)
         self._optimizer = torch.optim.Adam(self.actor.parameters(), lr=self.given.learning_rate)
         self._order = torch.Generator().manual_seed(config.seed + _SEED_OF_ORDER)
-        self._seen: list[torch.Tensor] = []
-        self._told: list[torch.Tensor] = []
+        self._observations: list[torch.Tensor] = []
+        self._labels: list[torch.Tensor] = []
         self._rounds = 0
         self._last: dict[str, float] = {}
 
@@ -224,32 +216,32 @@ class ImitationLearner:
             boundary()
             self._drive()
             if self._rounds == 0:
-                take_standard(self.actor, self._seen[0].numpy(), self._told[0].numpy())
+                normalize_by(self.actor, self._observations[0].numpy(), self._labels[0].numpy())
             self._fit()
             self._rounds += 1
 
     def _drive(self) -> None:
-        """An episode everywhere; keeps what was seen before each action, and what the teacher would do."""
+        """An episode everywhere; keeps the observation before each action, and the teacher's label."""
         batch, arrays = self.batch, self.batch.arrays
         batch.begin(self._everywhere)
         batch.observe(self._everywhere)
         self.teacher.begin()
         by_teacher = np.arange(batch.n) < round(self._share() * batch.n)
-        seen, told, costs = [], [], 0.0
+        observations, labels, costs = [], [], 0.0
         for _ in range(self._length):
             observation = torch.from_numpy(arrays.observation.pull().copy())
             with torch.no_grad():
                 own = self.actor(observation).numpy()
             for step in range(self._repeat):
-                answer = self.teacher(arrays.core.pull())
+                label = self.teacher(arrays.core.pull())
                 if step == 0:
-                    seen.append(observation)
-                    told.append(torch.from_numpy(answer))
-                batch.write(np.where(by_teacher[:, None], answer, own))
+                    observations.append(observation)
+                    labels.append(torch.from_numpy(label))
+                batch.write(np.where(by_teacher[:, None], label, own))
                 batch.step()
                 costs -= float(arrays.reward.pull().mean())
-        self._seen.append(torch.cat(seen))
-        self._told.append(torch.cat(told))
+        self._observations.append(torch.cat(observations))
+        self._labels.append(torch.cat(labels))
         self._last["rollout/reward"] = -costs / (self._length * self._repeat)
         self._last["rollout/teacher_share"] = float(by_teacher.mean())
 
@@ -262,22 +254,24 @@ class ImitationLearner:
     def _fit(self) -> None:
         """Steps of Adam over the data of all rounds."""
         given = self.given
-        seen, told = torch.cat(self._seen), torch.cat(self._told)
+        observations, labels = torch.cat(self._observations), torch.cat(self._labels)
         for group in self._optimizer.param_groups:
             group["lr"] = given.learning_rate * warm_cosine(self.steps / self._total)
         total = 0.0
         for _ in range(given.updates):
-            chosen = torch.randint(len(seen), (given.batch_size,), generator=self._order)
-            # Every axis by the reach of its own actions; far from the teacher's way answers are wild.
+            chosen = torch.randint(len(observations), (given.batch_size,), generator=self._order)
+            # Every axis relative to its own scale. Huber loss: far from the teacher's path labels are wild.
             reach = self.actor.reach
-            loss = torch.nn.functional.smooth_l1_loss(self.actor(seen[chosen]) / reach, told[chosen] / reach)
+            loss = torch.nn.functional.smooth_l1_loss(
+                self.actor(observations[chosen]) / reach, labels[chosen] / reach
+            )
             self._optimizer.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             torch.nn.utils.clip_grad_norm_(self.actor.parameters(), given.max_grad_norm)
             self._optimizer.step()
             total += float(loss.detach())
         self._last["train/loss"] = total / given.updates
-        self._last["train/samples"] = float(len(seen))
+        self._last["train/samples"] = float(len(observations))
 
     def scalars(self) -> dict[str, float]:
         """Of the last round."""
@@ -293,7 +287,7 @@ class ImitationLearner:
             "actor": self.actor.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "batch": self.batch.snapshot(),
-            "data": [list(self._seen), list(self._told)],
+            "data": [list(self._observations), list(self._labels)],
             "order": self._order.get_state(),
             "rounds": self._rounds,
             "last": dict(self._last),
@@ -305,7 +299,7 @@ class ImitationLearner:
             self.actor.load_state_dict(state["actor"])
             self._optimizer.load_state_dict(state["optimizer"])
             self.batch.restore(state["batch"])
-            self._seen, self._told = (list(part) for part in state["data"])
+            self._observations, self._labels = (list(part) for part in state["data"])
             self._order.set_state(state["order"])
             self._rounds = int(state["rounds"])
             self._last = dict(state["last"])

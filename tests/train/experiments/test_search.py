@@ -21,7 +21,7 @@ from motion_cueing.train.experiments.search import Search, suggest
 from motion_cueing.train.progress import FleetProgress
 from motion_cueing.train.training import Training
 
-from . import tiny
+from .. import tiny
 
 SPACE = {
     "hyperparameters.policy_kwargs.net_arch": {"choices": [[4], [6, 6]]},

@@ -9,8 +9,14 @@ import torch
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.options import TaskOptions
 from motion_cueing.envs.task.unroll import TaskUnroll
-from motion_cueing.train.algorithms.apg.gradients import Ahead, ThroughTime, ValueOptions, tamed
-from motion_cueing.train.networks import TORCH_ACTIVATIONS, Actor, ActorSteps, begin_at_rest, standardize
+from motion_cueing.train.algorithms.apg.backpropagation import NumpyBackward, Rollout, clip_outliers
+from motion_cueing.train.algorithms.apg.value import ValueBootstrap, ValueOptions
+from motion_cueing.train.networks import (
+    TORCH_ACTIVATIONS,
+    Actor,
+    normalize_by_rollout,
+    start_as_spring_damper,
+)
 
 N, ACTIONS = 3, 12
 
@@ -19,7 +25,7 @@ def actor(activation: str = "elu", hidden: tuple[int, ...] = (5, 4)) -> Actor:
     """A network with a standard of its own."""
     torch.manual_seed(1)
     made = Actor(7, 3, hidden, activation)
-    made.standardize(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
+    made.set_normalization(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
     return made
 
 
@@ -27,7 +33,7 @@ def actor(activation: str = "elu", hidden: tuple[int, ...] = (5, 4)) -> Actor:
 @pytest.mark.parametrize("activation", TORCH_ACTIVATIONS)
 def test_steps_by_hand_are_those_of_the_graph(activation, hidden):
     network = actor(activation, hidden)
-    steps = ActorSteps(network)
+    steps = NumpyBackward(network)
     seen, gradient = torch.randn(4, 6, 7), torch.randn(4, 6, 3)
     for k in range(4):
         np.testing.assert_allclose(steps.act(seen[k].numpy()), network(seen[k]).detach(), atol=1e-6)
@@ -41,7 +47,7 @@ def test_a_standard_changes_nothing_of_what_is_done():
     torch.manual_seed(2)
     network, seen = Actor(7, 3, (5, 4)), torch.randn(6, 7)
     before = network(seen).detach()
-    network.standardize(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
+    network.set_normalization(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
     np.testing.assert_allclose(network(seen).detach(), before, atol=1e-6)
     np.testing.assert_allclose(network.network()(seen.numpy()), before, atol=1e-6)
 
@@ -63,8 +69,8 @@ def begun(batch: Batch) -> Actor:
     """An actor that does a little of everything."""
     torch.manual_seed(3)
     network = Actor(batch.layout.size, batch.action_size, (8,))
-    begin_at_rest(network, batch)
-    standardize(network, batch, 20)
+    start_as_spring_damper(network, batch)
+    normalize_by_rollout(network, batch, 20)
     with torch.no_grad():
         network.head.weight += 0.05 * torch.randn_like(network.head.weight)
     return network
@@ -73,9 +79,9 @@ def begun(batch: Batch) -> Actor:
 def test_observations_are_seen_relative_to_their_own_mean_and_deviation(batch):
     torch.manual_seed(3)
     network = Actor(batch.layout.size, batch.action_size, (8,))
-    begin_at_rest(network, batch)
+    start_as_spring_damper(network, batch)
     batch.seed(np.ones(N, dtype=bool), [4, 5, 6])
-    standardize(network, batch, 20)
+    normalize_by_rollout(network, batch, 20)
     batch.seed(np.ones(N, dtype=bool), [4, 5, 6])
     batch.begin(np.ones(N, dtype=bool))
     batch.observe(np.ones(N, dtype=bool))
@@ -95,19 +101,19 @@ def test_gradients_agree_with_finite_differences(batch, options):
     """Of the weighted whole of windows, with and without a value at their end, in the actor's weights."""
     network = begun(batch)
     unroll = TaskUnroll(batch, ACTIONS)
-    ahead = Ahead(options, network, ACTIONS, batch.time_step)
+    ahead = ValueBootstrap(options, network, ACTIONS, batch.time_step)
     weights = np.array([1.0, 0.5, 2.0])
     batch.seed(np.ones(N, dtype=bool), [7, 8, 9])
     batch.begin(np.ones(N, dtype=bool))
 
-    def whole() -> tuple[ThroughTime, float]:
+    def whole() -> tuple[Rollout, float]:
         unroll.begin()
-        drive = ThroughTime(unroll, network)
-        return drive, float(ahead.whole(unroll.costs, drive.seen[-1]) @ weights)
+        drive = Rollout(unroll, network)
+        return drive, float(ahead.cost(unroll.costs, drive.observations[-1]) @ weights)
 
     drive, _ = whole()
-    gradients = drive.lead_back(ahead.weights(weights), ahead.gradient(drive.seen[-1], weights))
-    torch.sum(network(drive.seen[:-1]) * gradients).backward()
+    gradients = drive.backward(ahead.weights(weights), ahead.gradient(drive.observations[-1], weights))
+    torch.sum(network(drive.observations[:-1]) * gradients).backward()
     torch.manual_seed(5)
     direction = [torch.randn_like(p) for p in network.parameters()]
     found = sum(float((p.grad * d).sum()) for p, d in zip(network.parameters(), direction, strict=True))
@@ -125,7 +131,7 @@ def test_a_window_with_a_wild_gradient_does_not_drown_the_others():
     gradients = torch.ones(4, 3, 2)
     gradients[:, 1] *= 1e9
     gradients[:, 2] *= torch.nan
-    found, left_out = tamed(gradients, 2.0)
+    found, left_out = clip_outliers(gradients, 2.0)
     norms = found.flatten(2).pow(2).sum(dim=(0, 2)).sqrt()
     assert norms[0] == pytest.approx(np.sqrt(8.0))
     assert norms[1] == pytest.approx(2.0 * np.sqrt(8.0))
@@ -136,14 +142,14 @@ def test_a_window_with_a_wild_gradient_does_not_drown_the_others():
 def test_a_value_learns_what_a_steady_cost_comes_to():
     """A cost that is a function of what is seen, and stays: its discounted mean is the cost itself."""
     network = actor()
-    ahead = Ahead(ValueOptions(net_arch=(16,), horizon=0.5, learning_rate=1e-2), network, 10, 0.05)
+    ahead = ValueBootstrap(ValueOptions(net_arch=(16,), horizon=0.5, learning_rate=1e-2), network, 10, 0.05)
     torch.manual_seed(0)
     for _ in range(150):
         point = torch.randn(32, 7)
         ahead.learn(point.expand(11, 32, 7), np.tile(1.0 + point[:, 0].numpy() ** 2, (10, 1)))
     point = torch.randn(200, 7)
     expected = 1.0 + point[:, 0].numpy() ** 2
-    found = ahead.whole(np.tile(expected, (10, 1)), point)
+    found = ahead.cost(np.tile(expected, (10, 1)), point)
     assert np.corrcoef(found, expected)[0, 1] > 0.98
     assert np.abs(found - expected).mean() < 0.2
 
@@ -151,7 +157,7 @@ def test_a_value_learns_what_a_steady_cost_comes_to():
 def test_targets_are_discounted_sums():
     """With lambda 1, against the sum written out; with lambda 0, a step and the next value."""
     network = actor()
-    critic = Ahead(ValueOptions(net_arch=(8,)), network, 4, 0.1)._critic
+    critic = ValueBootstrap(ValueOptions(net_arch=(8,)), network, 4, 0.1)._critic
     seen, costs = torch.randn(5, 2, 7), torch.rand(4, 2)
     values = critic(seen).detach()
     g = 0.9

@@ -14,9 +14,10 @@ import torch
 from motion_cueing.cli.main import main
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.train.agents import Network, export
-from motion_cueing.train.agents.export import ExportError, export_onnx, torch_module
+from motion_cueing.train.agents.export import ExportError, export_onnx
+from motion_cueing.train.networks import TorchNetwork
 
-from .agents import agent, network
+from . import agent, network
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +32,7 @@ def test_pytorch_computes_what_numpy_does(activation, squash, skip, normalized):
     net = network((20, 32, 24, 5), activation=activation, squash=squash, skip=skip, normalized=normalized)
     observation = np.random.default_rng(1).normal(scale=3.0, size=(100, 20)).astype(np.float32)
     with torch.no_grad():
-        found = torch_module(net)(torch.from_numpy(observation)).numpy()
+        found = TorchNetwork(net)(torch.from_numpy(observation)).numpy()
     assert np.abs(found - net(observation)).max() < 3e-6
 
 
@@ -71,7 +72,7 @@ def test_the_file_says_what_its_numbers_mean(tmp_path):
 def test_a_file_that_computes_something_else_is_not_written(tmp_path, monkeypatch):
     one = agent()
     other = replace(one, network=network((one.layout.size, 8, 9), seed=9))
-    monkeypatch.setattr(export, "torch_module", lambda net, make=torch_module: make(other.network))
+    monkeypatch.setattr("motion_cueing.train.networks.TorchNetwork", lambda net: TorchNetwork(other.network))
     with pytest.raises(ExportError, match="nothing was written"):
         export_onnx(one, tmp_path / "a.onnx")
     assert not list(tmp_path.iterdir())

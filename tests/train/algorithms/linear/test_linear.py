@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.task.observation import layout_of
-from motion_cueing.train.algorithms.apg.learner import GradientLearner
-from motion_cueing.train.algorithms.linear.learner import (
+from motion_cueing.train.algorithms.apg.apg import ApgLearner
+from motion_cueing.train.algorithms.linear.linear import (
     LinearLearner,
     LinearWashout,
     coordinates,
@@ -146,7 +146,7 @@ def test_the_gradient_goes_on_from_it(config):
     """Silent hidden layers learn, too."""
     learner = LinearLearner(config)
     given = {"net_arch": [8]}
-    other = GradientLearner(replace(config, algo="apg", hyperparameters=given, steps=2 * 40 * 3))
+    other = ApgLearner(replace(config, algo="apg", hyperparameters=given, steps=2 * 40 * 3))
     other.actor.load(learner.network())
     before = other.network().weights[0].copy()
     other.learn(nothing)

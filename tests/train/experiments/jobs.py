@@ -15,7 +15,7 @@ from motion_cueing.train.experiments.jobs import TrainingJob
 from motion_cueing.train.run import checkpoints_in
 from motion_cueing.train.training import Status
 
-from . import tiny
+from .. import tiny
 
 
 def config(folder: Path, **fields: Any) -> TrainingConfig:

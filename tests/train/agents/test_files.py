@@ -20,7 +20,7 @@ from motion_cueing.train.agents import Agent, agent_names, get_agent
 from motion_cueing.train.agents import agent as shipped
 from motion_cueing.train.agents.files import FORMAT, checksum, read, write
 
-from .agents import agent
+from . import agent
 
 TASKS = {
     "default": (TaskOptions(), None),

@@ -1,4 +1,8 @@
-"""Hyperparameters as YAML has them become arguments of a Stable-Baselines3 class, checked against it."""
+"""Algorithms of Stable-Baselines3: PPO, SAC, TD3, and TQC of sb3-contrib.
+
+Hyperparameters are those of the class, as rl-baselines3-zoo writes them in YAML, checked against its
+signature.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ from ...agents.base_policy import base_policy
 from ...config import TrainingConfig
 from ...logs import Monitor
 from ...networks import TORCH_ACTIVATIONS
-from ...registry import Boundary, State
+from ...registry import Boundary, Learner, State
 from ...training import initial_network
 from ...vec_env import DrivingSimulatorVecEnv
 from .policy import SkipPolicy, load_network, network_of
@@ -63,10 +67,9 @@ def arguments(
     Args:
         algorithm: Its class.
         hyperparameters: As in rl-baselines3-zoo: numbers may be schedules (``lin_3e-4``); ``policy_kwargs``
-            is a mapping, its ``activation_fn`` one of :data:`TORCH_ACTIVATIONS`; ``policy`` "MlpPolicy"
-            or, for
-            PPO, "SkipPolicy", whose last layers see the observation, too; ``noise_type`` and ``noise_std``
-            make the action noise.
+            is a mapping, its ``activation_fn`` one of :data:`TORCH_ACTIVATIONS`. ``policy`` is "MlpPolicy"
+            or, for PPO, "SkipPolicy", with a skip connection. ``noise_type`` and ``noise_std`` make the
+            action noise.
         action_size: Entries of an action.
 
     Raises:
@@ -75,9 +78,9 @@ def arguments(
     known = _parameters(algorithm, _OURS)
     noisy = "action_noise" in inspect.signature(algorithm).parameters
     _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *(_NOISE if noisy else ())])
-    found = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
-    found["policy_kwargs"] = _policy_kwargs(algorithm, found.get("policy_kwargs") or {})
-    checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in found.items()}
+    given = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
+    given["policy_kwargs"] = _policy_kwargs(algorithm, given.get("policy_kwargs") or {})
+    checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in given.items()}
     checked[_POLICY] = _policy(
         algorithm, hyperparameters.get(_POLICY, "MlpPolicy"), bool(hyperparameters.get("use_sde"))
     )
@@ -161,22 +164,14 @@ def _noise(given: Mapping[str, Any], size: int) -> Any:
     return NOISES[kind](mean=np.zeros(size), sigma=np.full(size, float(deviation)))
 
 
-# Stable-Baselines3's algorithms as a learner.
-
-
 _NUMBER: Final = (int, float, np.number)
 _INITIAL_WEIGHT: Final = 1e5
 """Observations that the normalization of an initial agent counts for."""
 CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 
 
-def make_learner(config: TrainingConfig) -> SB3Learner:
-    """The learner of a configuration whose ``algo`` is one of :data:`CLASSES`."""
-    return SB3Learner(config)
-
-
-class SB3Learner:
-    """A Stable-Baselines3 model with its environments; see :class:`~.learner.Learner`.
+class SB3Learner(Learner):
+    """A Stable-Baselines3 model with its environments; see :class:`~...registry.Learner`.
 
     Args:
         config: The training.
@@ -229,13 +224,13 @@ class SB3Learner:
         return settled
 
     def scalars(self) -> dict[str, float]:
-        """Means over what was played since the last call, and what the update told last."""
-        told = self._told()
+        """Means since the last call, and what the last update logged."""
+        logged = self._logged()
         self.model.logger.name_to_value.clear()
         self.model.logger.name_to_count.clear()
-        return {**self.monitor.take(), **told}
+        return {**self.monitor.take(), **logged}
 
-    def _told(self) -> dict[str, float]:
+    def _logged(self) -> dict[str, float]:
         values: dict[str, Any] = self.model.logger.name_to_value
         return {name: float(value) for name, value in values.items() if isinstance(value, _NUMBER)}
 
@@ -246,7 +241,7 @@ class SB3Learner:
     def state(self) -> dict[str, Any]:
         """Weights, optimizers, replay buffer, normalization, environments, random generators, log."""
         whole = state_of(self.model, self.simulators, self.normalize)
-        return {**whole, "monitor": self.monitor.state(), "told": self._told()}
+        return {**whole, "monitor": self.monitor.state(), "told": self._logged()}
 
     def restore(self, state: State) -> None:
         """Go on from a state."""

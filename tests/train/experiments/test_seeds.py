@@ -16,7 +16,7 @@ from motion_cueing.train.experiments import seeds as studies
 from motion_cueing.train.experiments.seeds import Seeds, summary
 from motion_cueing.train.training import Training
 
-from . import tiny
+from .. import tiny
 
 
 def rows(folder: Path) -> list[dict[str, str]]:
