@@ -16,7 +16,7 @@ from rich.progress import (
 )
 from typing_extensions import Self
 
-from .experiments.engines import Ending, Job
+from .experiments.engine import Ending, Job
 from .training import Status
 
 
@@ -94,11 +94,8 @@ def line_of(status: Status) -> str:
     )
 
 
-# What a person sees while several agents are trained: bars, and a line for each validation.
-
-
 class FleetProgress(Bars):
-    """See :class:`~.engine.job.Listener`.
+    """See :class:`~.experiments.engine.Listener`.
 
     Args:
         console: Where to write; default: the error stream.

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ..baselines import ClassicalWashout
 from ..envs.errors import ConfigurationError
+from ..envs.interrupt import Interrupt
 from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.drives import platform_of
@@ -85,33 +84,6 @@ def warm_cosine(progress: float) -> float:
         return max(progress / _WARM_UP, _LEAST_RATE)
     turn = math.pi * (progress - _WARM_UP) / (1.0 - _WARM_UP)
     return _LEAST_RATE + (1.0 - _LEAST_RATE) * 0.5 * (1.0 + math.cos(turn))
-
-
-# Ctrl-C as a question that is answered between updates.
-
-
-class Interrupt:
-    """Whether Ctrl-C was pressed; the second time it interrupts at once."""
-
-    def __init__(self) -> None:
-        self.asked = False
-
-    @contextmanager
-    def caught(self) -> Iterator[None]:
-        """Hold SIGINT back within the block; only the main thread can."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        earlier = signal.signal(signal.SIGINT, self._ask)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, earlier)
-
-    def _ask(self, number: int, frame: Any) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
 
 
 # A training from beginning or checkpoint to its end: log, validation, checkpoints, agents.

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from motion_cueing.train.config import TrainingConfig
-from motion_cueing.train.experiments.engines import Ending, Job, Report
-from motion_cueing.train.experiments.jobs import TrainingJob
+from motion_cueing.train.experiments.engine import Ending, Job, Report
+from motion_cueing.train.experiments.job import TrainingJob
 from motion_cueing.train.run import checkpoints_in
 from motion_cueing.train.training import Status
 
@@ -19,12 +19,12 @@ from .. import tiny
 
 
 def config(folder: Path, **fields: Any) -> TrainingConfig:
-    """Twelve rounds of an analytic policy gradient."""
+    """Eight rounds of an analytic policy gradient."""
     small = tiny.config(
         folder,
         "apg",
         n_envs=3,
-        steps=720,
+        steps=480,
         task={"observation": {"frame": "cab"}, "action": {"frame": "cab", "repeat": 5, "authority": 0.5}},
         validation={"every": 240},
         checkpoints={"every": 120},

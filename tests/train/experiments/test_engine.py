@@ -14,20 +14,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.envs.settings import save
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
-from motion_cueing.train.experiments import engines as processes_engine
-from motion_cueing.train.experiments import ray_engine
+from motion_cueing.train.experiments import engine as engine_module
 from motion_cueing.train.experiments import seeds as studies
-from motion_cueing.train.experiments.engines import Engine, LocalEngine, make_engine, run_jobs
-from motion_cueing.train.experiments.jobs import TrainingJob
+from motion_cueing.train.experiments.engine import Engine, RayEngine, make_engine, run_jobs
+from motion_cueing.train.experiments.job import TrainingJob
 from motion_cueing.train.experiments.population import Population
-from motion_cueing.train.experiments.ray_engine import RayEngine
 from motion_cueing.train.experiments.search import Search
-from motion_cueing.train.run import checkpoints_in
+from motion_cueing.train.run import RunFolder, checkpoints_in
 from motion_cueing.train.training import Training
 
 from . import jobs
@@ -102,7 +98,7 @@ def test_a_killed_process_loses_nothing(engine, config, undisturbed, tmp_path):
     outcome, taken_up = endings["seed-0"].result
     assert outcome.status.steps == config.steps
     # The process that died had left these.
-    assert taken_up == ["step-000000000120", "step-000000000240"]
+    assert taken_up == ["step-000000000120"]
     assert_same(trainings, undisturbed[:1])
 
 
@@ -141,14 +137,14 @@ def test_a_training_asks_ray_for_what_it_needs(ray, config, monkeypatch):
             return self
 
         def remote(self, *arguments):
-            return None
+            return SimpleNamespace(future=lambda: None)
 
     monkeypatch.setattr(ray, "_perform", Task())
     job = TrainingJob("seed-0", Path("somewhere"), replace(config, threads=64, device="cuda:0"))
-    ray._start(job)
+    ray._submit(job)
     # As many cores as there are, or it would wait for ever.
     assert (asked["num_cpus"], asked["num_gpus"]) == (2.0, 1)
-    ray._start(replace(job, config=config))
+    ray._submit(replace(job, config=config))
     assert (asked["num_cpus"], asked["num_gpus"]) == (1.0, 0)
 
 
@@ -161,7 +157,7 @@ def test_a_folder_that_is_not_there_is_refused(config, tmp_path):
 def test_what_is_missing_is_told(monkeypatch):
     with pytest.raises(UnknownNameError, match=r"unknown engine 'rey'. Did you mean ray\?"):
         make_engine("rey")
-    monkeypatch.setattr(ray_engine, "find_spec", lambda name: None)
+    monkeypatch.setattr(engine_module, "find_spec", lambda name: None)
     with pytest.raises(ConfigurationError, match=r"needs ray: pip install 'motion-cueing-gym\[ray\]'"):
         make_engine("ray")
 
@@ -234,11 +230,11 @@ def test_an_unexpected_error_leaves_its_trace(config, tmp_path, monkeypatch):
     assert "in broken" in (tmp_path / "seed-0" / "error.txt").read_text()
 
 
-def test_a_population_comes_to_the_same_bits(ray, config, tmp_path):
+def test_a_population_comes_to_the_same_bits(processes, config, tmp_path):
     varied = {"hyperparameters.learning_rate": Choice(low=1e-4, high=1e-2, log=True)}
     config = replace(config, steps=480, search=varied, population=PopulationOptions(members=2))
     found = []
-    for name, engine in (("local", LocalEngine()), ("ray", ray)):
+    for name, engine in (("local", Engine()), ("processes", processes)):
         population = Population.create(tmp_path / name, config)
         assert not population.run(engine, jobs.Heard())
         found.append(population)
@@ -248,10 +244,10 @@ def test_a_population_comes_to_the_same_bits(ray, config, tmp_path):
         np.testing.assert_array_equal(a, b)
 
 
-def test_a_search_comes_to_the_same_results(ray, config, tmp_path):
+def test_a_search_comes_to_the_same_results(processes, config, tmp_path):
     varied = {"hyperparameters.learning_rate": Choice(low=1e-4, high=1e-2, log=True)}
     config, tables = replace(config, steps=240, search=varied), []
-    for name, engine in (("local", LocalEngine()), ("ray", ray)):
+    for name, engine in (("local", Engine()), ("processes", processes)):
         search = Search.create(tmp_path / name, config)
         assert not search.run(2, engine, jobs.Heard())
         tables.append((search.path / "results.csv").read_text())
@@ -261,20 +257,17 @@ def test_a_search_comes_to_the_same_results(ray, config, tmp_path):
 
 def test_a_single_training_runs_on_ray(ray, config, undisturbed, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(studies, "make_engine", lambda *place: nullcontext(ray))
-    save(config, tmp_path / "config.yaml")
-    out = tmp_path / "runs" / "one"
-    words = ["train", "--config", str(tmp_path / "config.yaml"), "--engine", "ray"]
-    assert main([*words, "--out", str(out)]) == 0
+    folder = RunFolder.create(tmp_path / "runs" / "one", config)
+    assert studies.run_training(folder, studies.Place("ray")) == 0
     told = capsys.readouterr()
     assert f"final.safetensors: the agent after {config.steps:,} steps" in told.out
-    assert told.err.count(" steps  J ") == 4
-    assert_same([TrainingJob("one", out, config)], undisturbed[:1])
+    assert told.err.count(" steps  J ") == 3
+    assert_same([TrainingJob("one", folder.path, config)], undisturbed[:1])
 
 
 @elsewhere
 def test_jobs_that_fail_say_why_and_others_go_on(engine, config, tmp_path, monkeypatch):
-    for module in (processes_engine, ray_engine):
-        monkeypatch.setattr(module, "RETRIES", 0)
+    monkeypatch.setattr(engine_module, "RETRIES", 0)
     mortal, whole = jobs.seeds(tmp_path / "runs", replace(config, steps=60), 2)
     several = [jobs.Mortal(mortal, always=True), jobs.Failing("wrong", config), whole]
     endings, interrupted = run_jobs(engine, several, jobs.Heard())

@@ -13,12 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.settings import from_dict, load
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
-from motion_cueing.train.experiments.engines import make_engine
+from motion_cueing.train.experiments.engine import make_engine
 from motion_cueing.train.experiments.population import Population, draw, explored, next_generation
 from motion_cueing.train.logs import read_log
 from motion_cueing.train.progress import FleetProgress
@@ -48,19 +47,19 @@ def random(seed: int = 0) -> np.random.Generator:
 def test_the_worst_go_on_from_the_best_and_all_others_from_themselves(ratings, replaced, seed):
     options = replace(OPTIONS, replaced=replaced)
     values = [draw(SPACE, random(i)) for i in range(len(ratings))]
-    descents = next_generation(ratings, values, SPACE, options, random(seed))
+    successors = next_generation(ratings, values, SPACE, options, random(seed))
     count = max(1, int(replaced * len(ratings)))
-    moved = [i for i, descent in enumerate(descents) if descent.parent != i]
+    moved = [i for i, successor in enumerate(successors) if successor.parent != i]
     assert len(moved) == count
     comparable = [rating if math.isfinite(rating) else math.inf for rating in ratings]
     ranked = sorted(comparable)
-    for member, descent in enumerate(descents):
+    for member, successor in enumerate(successors):
         if member in moved:
             assert comparable[member] >= ranked[-count]
-            assert comparable[descent.parent] <= ranked[count - 1]
+            assert comparable[successor.parent] <= ranked[count - 1]
         else:
-            assert descent.values == values[member]
-    assert descents == next_generation(ratings, values, SPACE, options, random(seed))
+            assert successor.values == values[member]
+    assert successors == next_generation(ratings, values, SPACE, options, random(seed))
 
 
 @settings(deadline=None, max_examples=50)
@@ -96,9 +95,9 @@ def test_values_at_the_beginning_fill_their_ranges():
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory) -> TrainingConfig:
-    """Four members, three generations."""
+    """Three members, two generations."""
     varied = {"hyperparameters.learning_rate": {"low": 1e-4, "high": 1e-2, "log": True}}
-    fields = {"algo": "apg", "search": varied, "population": {"members": 4}}
+    fields = {"algo": "apg", "search": varied, "population": {"members": 3}}
     chosen = from_dict(TrainingConfig, fields)
     base = jobs.config(tmp_path_factory.mktemp("config"))
     return replace(base, search=chosen.search, population=chosen.population)
@@ -123,16 +122,16 @@ def rates(path: Path) -> float:
 
 
 def test_members_go_on_from_their_parents_with_other_values(whole, config):
-    assert [len(members) for members in whole.generations] == [4, 4, 4]
+    assert [len(members) for members in whole.generations] == [3, 3]
     for number, members in enumerate(whole.generations, start=1):
         before = whole.generations[number - 2]
         ratings = [member.rating for member in members]
         assert None not in ratings
         if number == 1:
             continue
-        worst = max(range(4), key=lambda i: before[i].rating)
-        best = min(range(4), key=lambda i: before[i].rating)
-        assert [member.parent for member in members] == [best if i == worst else i for i in range(4)]
+        worst = max(range(3), key=lambda i: before[i].rating)
+        best = min(range(3), key=lambda i: before[i].rating)
+        assert [member.parent for member in members] == [best if i == worst else i for i in range(3)]
         for i, member in enumerate(members):
             path = whole.path / f"generation-{number:03d}" / f"member-{i}"
             parent = whole.path / f"generation-{number - 1:03d}" / f"member-{member.parent}"
@@ -155,11 +154,11 @@ def test_the_best_agents_are_kept(whole, config):
     assert final.steps == config.steps
     # Checkpoints are only for children that are not done.
     assert [path.parent.parent.name for path in whole.path.glob("*/member-0/checkpoints")] == [
-        "generation-003"
+        "generation-002"
     ]
     table = list(csv.DictReader((whole.path / "results.csv").open()))
-    assert len(table) == 12
-    assert float(table[-1]["rating"]) == whole.generations[-1][3].rating
+    assert len(table) == 6
+    assert float(table[-1]["rating"]) == whole.generations[-1][2].rating
 
 
 def test_one_that_is_stopped_goes_on_to_the_same_bits(whole, config, tmp_path, monkeypatch):
@@ -173,9 +172,9 @@ def test_one_that_is_stopped_goes_on_to_the_same_bits(whole, config, tmp_path, m
     with monkeypatch.context() as patched:
         patched.setattr(Training, "_boundary", pressed)
         assert run(population)
-    assert [member.rating for member in population.generations[1]] == [None] * 4
-    assert main(["train", "--resume", str(population.path)]) == 0
+    assert [member.rating for member in population.generations[1]] == [None] * 3
     again = Population.open(population.path)
+    assert not run(again)
     assert again.generations == whole.generations
     for name in ("best", "final"):
         one, other = (Agent.load(each.path / f"{name}.safetensors").network for each in (again, whole))
@@ -193,7 +192,7 @@ def test_a_member_that_fails_ends_it_and_a_broken_state_is_told(config, tmp_path
 
     with monkeypatch.context() as patched:
         patched.setattr(Training, "train", fail_once)
-        with pytest.raises(DataError, match=r"failed: member-1 \(not finite\); --resume .* tries again"):
+        with pytest.raises(DataError, match=r"failed: member-1 \(not finite\); the same command tries again"):
             run(population)
     (population.path / "population.json").write_text("[[{}]]")
     with pytest.raises(DataError, match="not the state of a population"):

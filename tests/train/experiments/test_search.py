@@ -10,14 +10,14 @@ import optuna
 import pytest
 from optuna.trial import TrialState
 
-from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import from_dict, load
 from motion_cueing.train import training
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig, load_config
-from motion_cueing.train.experiments.engines import make_engine
+from motion_cueing.train.experiments.engine import make_engine
 from motion_cueing.train.experiments.search import Search, suggest
+from motion_cueing.train.experiments.seeds import Place, run_search
 from motion_cueing.train.progress import FleetProgress
 from motion_cueing.train.training import Training
 
@@ -41,14 +41,13 @@ def rows(search: Search) -> list[dict[str, str]]:
 
 
 def test_a_search_finds_a_configuration_resumes_and_runs_in_processes(tmp_path, capsys):
-    path, out = tiny.config_file(tmp_path, "ppo", search=SPACE), tmp_path / "search"
-    words = ["train", "--algo", "ppo", "--config", str(path), "--steps", "128", "--search", "2"]
-    assert main([*words, "--out", str(out)]) == 0
+    search = Search.create(tmp_path / "search", tiny.config(tmp_path, "ppo", search=SPACE, steps=128))
+    assert run_search(search, 2, Place("local")) == 0
     assert "best.yaml: trial" in capsys.readouterr().out
-    assert len(rows(Search.open(out))) == 2
-    assert main(["train", "--resume", str(out), "--search", "4", "--jobs", "2"]) == 0
+    assert len(rows(Search.open(search.path))) == 2
+    search = Search.open(search.path)
+    assert run_search(search, 4, Place("local", 2)) == 0
 
-    search = Search.open(out)
     found = rows(search)
     assert [row["state"] in ("complete", "pruned") for row in found] == [True] * 4
     for row in found:
@@ -61,7 +60,7 @@ def test_a_search_finds_a_configuration_resumes_and_runs_in_processes(tmp_path, 
     assert str(config.hyperparameters["learning_rate"]) == best["hyperparameters.learning_rate"]
     assert str(config.task.action.repeat) == best["task.action.repeat"]
     assert load_config(None, search.best_config) == config
-    agent = Agent.load(out / "trials" / f"{int(best['trial']):04d}" / "best.safetensors")
+    agent = Agent.load(search.path / "trials" / f"{int(best['trial']):04d}" / "best.safetensors")
     assert agent.record.validation == pytest.approx(float(best["result"]), rel=1e-5)
     # All results are there: nothing is trained again.
     assert not run(search, 4)
