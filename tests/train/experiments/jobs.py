@@ -1,18 +1,15 @@
-"""Jobs whose process dies in the middle, and who listens to them."""
+"""Trainings as jobs, and who listens to them."""
 
 from __future__ import annotations
 
-import os
 import signal
-import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from motion_cueing.train.config import TrainingConfig
-from motion_cueing.train.experiments.engine import Ending, Job, Report
+from motion_cueing.train.experiments.engine import Ending, Job
 from motion_cueing.train.experiments.job import TrainingJob
-from motion_cueing.train.run import checkpoints_in
 from motion_cueing.train.training import Status
 
 from .. import tiny
@@ -39,72 +36,6 @@ def seeds(folder: Path, config: TrainingConfig, count: int) -> list[TrainingJob]
         TrainingJob(f"seed-{seed}", folder / f"seed-{seed}", replace(config, seed=seed))
         for seed in range(count)
     ]
-
-
-@dataclass(frozen=True)
-class Around:
-    """A job around a training.
-
-    Args:
-        training: The training.
-    """
-
-    training: TrainingJob
-
-    @property
-    def name(self) -> str:
-        return self.training.name
-
-    @property
-    def config(self) -> TrainingConfig:
-        return self.training.config
-
-
-@dataclass(frozen=True)
-class Mortal(Around):
-    """A training whose process is killed when it is half done; once, or always.
-
-    Args:
-        always: Whether every process that takes it up is killed.
-    """
-
-    always: bool = False
-
-    def run(self, report: Report) -> Any:
-        seen = [path.stem for path in checkpoints_in(self.training.path / "checkpoints")]
-
-        def fatal(status: Status) -> bool:
-            answer = report(status)
-            if (2 * status.steps >= status.total and not seen) or self.always:
-                os.kill(os.getpid(), signal.SIGKILL)
-            return answer
-
-        outcome = self.training.run(fatal)
-        return outcome, seen
-
-
-@dataclass(frozen=True)
-class Failing:
-    """A job that fails where it is run."""
-
-    name: str
-    config: TrainingConfig
-
-    def run(self, report: Report) -> Any:
-        raise ZeroDivisionError("one by\nnothing")
-
-
-@dataclass(frozen=True)
-class Waiting(Around):
-    """A training that waits, half done, to be stopped."""
-
-    def run(self, report: Report) -> Any:
-        def held(status: Status) -> bool:
-            while 2 * status.steps >= status.total and not report(status):
-                time.sleep(0.1)
-            return 2 * status.steps >= status.total
-
-        return self.training.run(held)
 
 
 class Heard:

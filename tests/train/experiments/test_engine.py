@@ -16,17 +16,17 @@ import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.train.agents import Agent
-from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
+from motion_cueing.train.config import Choice, TrainingConfig
 from motion_cueing.train.experiments import engine as engine_module
 from motion_cueing.train.experiments import seeds as studies
 from motion_cueing.train.experiments.engine import Engine, RayEngine, make_engine, run_jobs
 from motion_cueing.train.experiments.job import TrainingJob
-from motion_cueing.train.experiments.population import Population
 from motion_cueing.train.experiments.search import Search
 from motion_cueing.train.run import RunFolder, checkpoints_in
 from motion_cueing.train.training import Training
 
 from . import jobs
+from .light import Counting
 
 ELSEWHERE = ("processes", "ray")
 
@@ -79,8 +79,8 @@ def assert_same(found: list[TrainingJob], expected: list[TrainingJob]) -> None:
         assert (one.path / "log.csv").read_text() == (other.path / "log.csv").read_text()
 
 
-@elsewhere
-def test_seeds_come_to_the_same_bits_as_in_one_process(engine, config, undisturbed, tmp_path):
+def test_seeds_come_to_the_same_bits_as_in_one_process(processes, config, undisturbed, tmp_path):
+    engine = processes
     trainings, heard = jobs.seeds(tmp_path / "runs", config, 2), jobs.Heard()
     endings, interrupted = run_jobs(engine, trainings, heard)
     assert not interrupted
@@ -91,30 +91,63 @@ def test_seeds_come_to_the_same_bits_as_in_one_process(engine, config, undisturb
     assert not np.array_equal(first, second)
 
 
-@elsewhere
-def test_a_killed_process_loses_nothing(engine, config, undisturbed, tmp_path):
-    trainings = jobs.seeds(tmp_path / "runs", config, 1)
-    endings, _ = run_jobs(engine, [jobs.Mortal(trainings[0])], jobs.Heard())
-    outcome, taken_up = endings["seed-0"].result
-    assert outcome.status.steps == config.steps
-    # The process that died had left these.
-    assert taken_up == ["step-000000000120"]
-    assert_same(trainings, undisturbed[:1])
+def test_a_job_that_is_stopped_goes_on_to_the_same_bits(config, undisturbed, tmp_path):
+    (job,) = jobs.seeds(tmp_path / "runs", config, 1)
+    outcome = job.run(lambda status: 2 * status.steps >= status.total)
+    assert outcome.interrupted
+    (*_, last) = checkpoints_in(job.path / "checkpoints")
+    assert last.stem == f"step-{config.steps // 2:012d}"
+    assert not job.run(lambda status: False).interrupted
+    assert_same([job], undisturbed[:1])
 
 
 @elsewhere
-def test_ctrl_c_leaves_checkpoints_from_which_all_go_on(engine, config, undisturbed, tmp_path):
-    trainings = jobs.seeds(tmp_path / "runs", config, 2)
-    waiting = [jobs.Waiting(job) for job in trainings]
-    endings, interrupted = run_jobs(engine, waiting, jobs.Heard(press_after=2))
-    assert interrupted
-    assert [ending.result.interrupted for ending in endings.values()] == [True, True]
-    for job in trainings:
-        (*_, last) = checkpoints_in(job.path / "checkpoints")
-        assert last.stem == f"step-{config.steps // 2:012d}"
-    _, interrupted = run_jobs(engine, trainings, jobs.Heard())
+def test_a_job_whose_process_is_killed_goes_on_from_its_files(engine, tmp_path):
+    killed, other = Counting(tmp_path / "a", killed_at=2), Counting(tmp_path / "b", total=2)
+    endings, interrupted = run_jobs(engine, [killed, other], jobs.Heard())
     assert not interrupted
-    assert_same(trainings, undisturbed)
+    assert endings["a"].result == (3, 4, False)
+    assert endings["b"].result == (1, 2, False)
+
+
+@elsewhere
+def test_ctrl_c_stops_every_job_and_no_other_begins(engine, tmp_path):
+    several = [Counting(tmp_path / name, waits_at=2) for name in "abc"]
+    endings, interrupted = run_jobs(engine, several, jobs.Heard(press_after=2))
+    assert interrupted
+    assert {name: ending.result for name, ending in endings.items()} == dict.fromkeys("ab", (1, 2, True))
+    endings, interrupted = run_jobs(engine, [Counting(job.path) for job in several], jobs.Heard())
+    assert not interrupted
+    assert [endings[name].result for name in "abc"] == [(3, 4, False), (3, 4, False), (1, 4, False)]
+
+
+@elsewhere
+def test_a_listener_stops_one_job(engine, tmp_path):
+    class Choosy(jobs.Heard):
+        def told(self, job, status):
+            super().told(job, status)
+            return job.name == "a"
+
+    several = [Counting(tmp_path / "a", waits_at=2), Counting(tmp_path / "b")]
+    endings, interrupted = run_jobs(engine, several, Choosy())
+    assert not interrupted
+    assert endings["a"].result == (1, 2, True)
+    assert endings["b"].result == (1, 4, False)
+
+
+@elsewhere
+def test_jobs_that_fail_say_why_and_others_go_on(engine, tmp_path, monkeypatch):
+    monkeypatch.setattr(engine_module, "RETRIES", 0)
+    several = [
+        Counting(tmp_path / "mortal", mortal=True),
+        Counting(tmp_path / "wrong", wrong=True),
+        Counting(tmp_path / "whole"),
+    ]
+    endings, interrupted = run_jobs(engine, several, jobs.Heard())
+    assert not interrupted
+    assert str(endings["mortal"].error).startswith("its process died 1 times")
+    assert endings["wrong"].error == "one by nothing"
+    assert endings["whole"].error is None
 
 
 def test_ray_listens_on_loopback_only(ray):
@@ -230,20 +263,6 @@ def test_an_unexpected_error_leaves_its_trace(config, tmp_path, monkeypatch):
     assert "in broken" in (tmp_path / "seed-0" / "error.txt").read_text()
 
 
-def test_a_population_comes_to_the_same_bits(processes, config, tmp_path):
-    varied = {"hyperparameters.learning_rate": Choice(low=1e-4, high=1e-2, log=True)}
-    config = replace(config, steps=480, search=varied, population=PopulationOptions(members=2))
-    found = []
-    for name, engine in (("local", Engine()), ("processes", processes)):
-        population = Population.create(tmp_path / name, config)
-        assert not population.run(engine, jobs.Heard())
-        found.append(population)
-    assert found[0].generations == found[1].generations
-    one, other = (Agent.load(population.best_agent).network for population in found)
-    for a, b in zip(one.weights, other.weights, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 def test_a_search_comes_to_the_same_results(processes, config, tmp_path):
     varied = {"hyperparameters.learning_rate": Choice(low=1e-4, high=1e-2, log=True)}
     config, tables = replace(config, steps=240, search=varied), []
@@ -263,15 +282,3 @@ def test_a_single_training_runs_on_ray(ray, config, undisturbed, tmp_path, monke
     assert f"final.safetensors: the agent after {config.steps:,} steps" in told.out
     assert told.err.count(" steps  J ") == 3
     assert_same([TrainingJob("one", folder.path, config)], undisturbed[:1])
-
-
-@elsewhere
-def test_jobs_that_fail_say_why_and_others_go_on(engine, config, tmp_path, monkeypatch):
-    monkeypatch.setattr(engine_module, "RETRIES", 0)
-    mortal, whole = jobs.seeds(tmp_path / "runs", replace(config, steps=60), 2)
-    several = [jobs.Mortal(mortal, always=True), jobs.Failing("wrong", config), whole]
-    endings, interrupted = run_jobs(engine, several, jobs.Heard())
-    assert not interrupted
-    assert str(endings["seed-0"].error).startswith("its process died 1 times")
-    assert endings["wrong"].error == "one by nothing"
-    assert endings["seed-1"].error is None

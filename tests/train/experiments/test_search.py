@@ -40,13 +40,13 @@ def rows(search: Search) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_a_search_finds_a_configuration_resumes_and_runs_in_processes(tmp_path, capsys):
+def test_a_search_finds_a_configuration_and_goes_on(tmp_path, capsys):
     search = Search.create(tmp_path / "search", tiny.config(tmp_path, "ppo", search=SPACE, steps=128))
     assert run_search(search, 2, Place("local")) == 0
     assert "best.yaml: trial" in capsys.readouterr().out
     assert len(rows(Search.open(search.path))) == 2
     search = Search.open(search.path)
-    assert run_search(search, 4, Place("local", 2)) == 0
+    assert run_search(search, 4, Place("local")) == 0
 
     found = rows(search)
     assert [row["state"] in ("complete", "pruned") for row in found] == [True] * 4
