@@ -48,21 +48,27 @@ def same_networks(one, other) -> bool:
     return all(np.array_equal(x, y) for x, y in zip(*arrays, strict=True))
 
 
+_SDE = {"use_sde": True, "train_freq": 8, "policy_kwargs": {"clip_mean": 0.0}}
+_SCHEDULES = {"learning_rate": "lin_1e-3", "clip_range": "lin_0.2"}
+_NOISE = {"noise_type": "ornstein-uhlenbeck"}
+_NOT_NORMALIZED = {"observation": False, "reward": False}
 CASES = {
-    **{name: (name, {}) for name in tiny.ALGORITHMS},
-    "full replay buffer": ("sac", {"hyperparameters": {"buffer_size": 60}}),
-    "several steps": ("tqc", {"hyperparameters": {"train_freq": 3, "gradient_steps": 2}}),
-    "returns of several steps": ("sac", {"hyperparameters": {"n_steps": 3}}),
-    "noise that remembers": ("td3", {"hyperparameters": {"noise_type": "ornstein-uhlenbeck"}}),
-    "schedules": ("ppo", {"hyperparameters": {"learning_rate": "lin_1e-3", "clip_range": "lin_0.2"}}),
-    "residual": ("ppo", {"task": {"action": {"mode": "residual"}}}),
-    "gains": ("ppo", {"task": {"action": {"mode": "gains"}}}),
-    "nothing normalized": ("td3", {"normalize": {"observation": False, "reward": False}}),
-    "state-dependent exploration": ("ppo", {"hyperparameters": {"use_sde": True}}),
-    "the same off-policy": (
-        "sac",
-        {"hyperparameters": {"use_sde": True, "train_freq": 8, "policy_kwargs": {"clip_mean": 0.0}}},
+    "ppo, schedules": ("ppo", {"hyperparameters": _SCHEDULES}),
+    "ppo, residual": ("ppo", {"task": {"action": {"mode": "residual"}}}),
+    "ppo, gains, state-dependent exploration": (
+        "ppo",
+        {"task": {"action": {"mode": "gains"}}, "hyperparameters": {"use_sde": True}},
     ),
+    "sac, full replay buffer, returns of several steps": (
+        "sac",
+        {"hyperparameters": {"buffer_size": 60, "n_steps": 3}},
+    ),
+    "sac, state-dependent exploration": ("sac", {"hyperparameters": _SDE}),
+    "td3, noise that remembers, nothing normalized": (
+        "td3",
+        {"hyperparameters": _NOISE, "normalize": _NOT_NORMALIZED},
+    ),
+    "tqc, several steps": ("tqc", {"hyperparameters": {"train_freq": 3, "gradient_steps": 2}}),
 }
 
 

@@ -9,10 +9,9 @@ import torch
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.options import TaskOptions
 from motion_cueing.envs.task.unroll import TaskUnroll
-from motion_cueing.train.algorithms.apg.backpropagation import NumpyBackward, Rollout, clip_outliers
+from motion_cueing.train.algorithms.apg.backpropagation import Rollout, clip_outliers
 from motion_cueing.train.algorithms.apg.value import ValueBootstrap, ValueOptions
 from motion_cueing.train.networks import (
-    TORCH_ACTIVATIONS,
     Actor,
     normalize_by_rollout,
     start_as_spring_damper,
@@ -27,29 +26,6 @@ def actor(activation: str = "elu", hidden: tuple[int, ...] = (5, 4)) -> Actor:
     made = Actor(7, 3, hidden, activation)
     made.set_normalization(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
     return made
-
-
-@pytest.mark.parametrize("hidden", [(5, 4), (6,)])
-@pytest.mark.parametrize("activation", TORCH_ACTIVATIONS)
-def test_steps_by_hand_are_those_of_the_graph(activation, hidden):
-    network = actor(activation, hidden)
-    steps = NumpyBackward(network)
-    seen, gradient = torch.randn(4, 6, 7), torch.randn(4, 6, 3)
-    for k in range(4):
-        np.testing.assert_allclose(steps.act(seen[k].numpy()), network(seen[k]).detach(), atol=1e-6)
-    for k in reversed(range(4)):
-        point = seen[k].clone().requires_grad_(True)
-        (expected,) = torch.autograd.grad(network(point), point, gradient[k])
-        np.testing.assert_allclose(steps.back(gradient[k].numpy()), expected, atol=1e-5)
-
-
-def test_a_standard_changes_nothing_of_what_is_done():
-    torch.manual_seed(2)
-    network, seen = Actor(7, 3, (5, 4)), torch.randn(6, 7)
-    before = network(seen).detach()
-    network.set_normalization(torch.randn(7), torch.rand(7) + 0.5, torch.rand(3) + 0.2)
-    np.testing.assert_allclose(network(seen).detach(), before, atol=1e-6)
-    np.testing.assert_allclose(network.network()(seen.numpy()), before, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
