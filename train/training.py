@@ -1,4 +1,9 @@
-"""A training that begins with the network of an agent there is already."""
+"""The training loop: from the start or a checkpoint to the end, with log, validation, checkpoints and agents.
+
+A :class:`Training` makes the learner of its algorithm and calls ``learn``. Between updates the learner calls
+back: then whatever is due happens (:meth:`Training._boundary`). So every algorithm is validated, saved and
+stopped alike.
+"""
 
 from __future__ import annotations
 
@@ -84,9 +89,6 @@ def warm_cosine(progress: float) -> float:
         return max(progress / _WARM_UP, _LEAST_RATE)
     turn = math.pi * (progress - _WARM_UP) / (1.0 - _WARM_UP)
     return _LEAST_RATE + (1.0 - _LEAST_RATE) * 0.5 * (1.0 + math.cos(turn))
-
-
-# A training from beginning or checkpoint to its end: log, validation, checkpoints, agents.
 
 
 Tell = Callable[["Status"], None]

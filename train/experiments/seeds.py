@@ -18,7 +18,7 @@ from ...envs.settings import configuration, load, save
 from ...envs.storage import write_text
 from ...envs.task.options import PositiveCount
 from ..config import TrainingConfig
-from ..progress import FleetProgress
+from ..progress import TrainingProgress
 from ..run import RunFolder, free_folder
 from ..training import Outcome
 from .engine import Ending, Engine, Listener, make_engine, run_jobs
@@ -161,9 +161,9 @@ class Place:
         make_engine(self.engine, self.jobs, self.address)
 
     @contextmanager
-    def open(self) -> Iterator[tuple[Engine, FleetProgress]]:
+    def open(self) -> Iterator[tuple[Engine, TrainingProgress]]:
         """The engine, and what shows its work."""
-        with make_engine(self.engine, self.jobs, self.address) as engine, FleetProgress() as progress:
+        with make_engine(self.engine, self.jobs, self.address) as engine, TrainingProgress() as progress:
             yield engine, progress
 
     @property

@@ -20,7 +20,7 @@ from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
 from motion_cueing.train.experiments.engine import make_engine
 from motion_cueing.train.experiments.population import Population, draw, explored, next_generation
 from motion_cueing.train.logs import read_log
-from motion_cueing.train.progress import FleetProgress
+from motion_cueing.train.progress import TrainingProgress
 from motion_cueing.train.run import RunFolder
 from motion_cueing.train.training import Training
 
@@ -105,7 +105,7 @@ def config(tmp_path_factory) -> TrainingConfig:
 
 def run(population: Population) -> bool:
     with make_engine("local") as engine:
-        return population.run(engine, FleetProgress())
+        return population.run(engine, TrainingProgress())
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from motion_cueing.train.config import TrainingConfig, load_config
 from motion_cueing.train.experiments.engine import make_engine
 from motion_cueing.train.experiments.search import Search, suggest
 from motion_cueing.train.experiments.seeds import Place, run_search
-from motion_cueing.train.progress import FleetProgress
+from motion_cueing.train.progress import TrainingProgress
 from motion_cueing.train.training import Training
 
 from .. import tiny
@@ -32,7 +32,7 @@ SPACE = {
 
 def run(search: Search, trials: int) -> bool:
     with make_engine("local") as engine:
-        return search.run(trials, engine, FleetProgress())
+        return search.run(trials, engine, TrainingProgress())
 
 
 def rows(search: Search) -> list[dict[str, str]]:

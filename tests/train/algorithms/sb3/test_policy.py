@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
+from sb3_contrib import ARS, CrossQ, RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecNormalize
@@ -170,3 +171,17 @@ def test_noise_that_depends_on_the_state_is_refused_where_the_mean_goes_through_
         arguments(PPO, {"policy": "SkipPolicy", "use_sde": True}, 9)
     with pytest.raises(ConfigurationError, match=r"hyperparameters\.policy"):
         arguments(SAC, {"policy": "SkipPolicy"}, 9)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "policy", "message"),
+    [
+        (RecurrentPPO, "MlpLstmPolicy", "RecurrentPPO: .* it has a memory, which no agent has; train PPO"),
+        (ARS, "MlpPolicy", "ARS: .* make a motion_cueing.train.agents.Network of it"),
+        (CrossQ, "MlpPolicy", "CrossQ: .* make a motion_cueing.train.agents.Network of it"),
+    ],
+)
+def test_models_of_other_kinds_are_refused_in_one_sentence(algorithm, policy, message):
+    model = algorithm(policy, DrivingSimulatorVecEnv(1, episode=SHORT))
+    with pytest.raises(DataError, match=message):
+        network_of(model)
