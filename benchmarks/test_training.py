@@ -14,7 +14,7 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 
-from motion_cueing.train.algorithms.sb3.learner import make_learner
+from motion_cueing.train.algorithms.sb3.sb3 import SB3Learner
 from motion_cueing.train.config import load_config
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
@@ -81,6 +81,6 @@ def test_preset(benchmark):
     config = replace(
         config, task=replace(config.task, episode=episode), n_envs=ENVIRONMENTS, steps=ENVIRONMENTS * n
     )
-    learner = make_learner(config)
+    learner = SB3Learner(config)
     case = f"PPO, preset, {config.task.action.repeat} time steps an action"
     share(benchmark, case, learner.simulators, lambda: learner.learn(lambda: None), n)

@@ -14,7 +14,7 @@ from ..envs.errors import ConfigurationError
 from ..envs.maneuvers import drive_seeds
 from ..envs.settings import Positive, configuration, from_dict, read_yaml
 from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomizationOptions, TaskOptions
-from .registry import algorithm_names, get_algorithm, preset_file
+from .registry import algorithm_names, preset_of
 
 Measure = Literal["cue_error", "perceived_error", "reward"]
 """What makes one agent better than another on the validation drives."""
@@ -214,7 +214,8 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
     name = algo or named
     if name is None:
         raise ConfigurationError(f"--algo is missing; use one of {', '.join(algorithm_names())}")
-    preset = _fields(preset_file(get_algorithm(str(name))))
+    default = preset_of(str(name))
+    preset = {} if default is None else _fields(default)
     chosen = {key: value for key, value in fields.items() if value is not None}
     merged = merge(merge(preset, given), {"algo": name, **chosen})
     if "search" in given:

@@ -1,4 +1,4 @@
-"""Means over what was played since the last row of the log."""
+"""The log of a training: means since the last row, in a CSV file and for TensorBoard."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Monitor:
             reward: (n,) of each environment.
             terms: (n, N_TERMS) terms of the reward.
             infos: Of each environment; ``episode`` where one has ended, as ``Monitor`` of
-                Stable-Baselines3 tells it.
+                Stable-Baselines3 writes it.
         """
         self._steps += 1
         self._add("rollout/reward", float(reward.mean()))
@@ -62,9 +62,6 @@ class Monitor:
         """Go on from a state."""
         self._sums = dict(state["sums"])
         self._steps, self._episodes = state["steps"], state["episodes"]
-
-
-# The log of a training: rows of a CSV file, and the same for TensorBoard.
 
 
 STEPS: Final = "steps"

@@ -1,10 +1,14 @@
-"""The network that training moves: its last layer sees the hidden ones and the observation itself."""
+"""The multilayer perceptron in PyTorch: :class:`Actor` to train, :class:`TorchNetwork` to export.
+
+Both are the layers of :class:`~.agents.Network` (hidden layers, skip connection, output layer), which NumPy
+runs. An actor becomes a network by :meth:`Actor.network` and a network an actor by :meth:`Actor.load`.
+"""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -16,7 +20,8 @@ from ..envs.platform.kernels.step import AXES
 from ..envs.task.batch import Batch
 from ..envs.task.observation import MACHINE, Layout
 from .agents import Network
-from .agents.network import ACTIVATIONS
+
+Floats = NDArray[np.float32]
 
 TORCH_ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {
     "tanh": nn.Tanh,
@@ -24,25 +29,20 @@ TORCH_ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {
     "elu": nn.ELU,
     "silu": nn.SiLU,
 }
-"""Names of activations."""
-
-_SPRINGS: Final = {"carriage": 0.3, "hexapod": 1.0}
-"""Natural frequency of the spring and damper a training begins with, rad/s."""
-
-_TURNTABLE_DAMPING: Final = 0.5
-"""Of the turntable at the beginning, 1/s."""
+"""Activations of :data:`~.agents.network.ACTIVATIONS` as modules."""
 
 
-class Latent(nn.Module):
-    """[last hidden layer, observation]: what the last layer sees.
+class HiddenLayers(nn.Module):
+    """Hidden layers with their activations; the skip connection appends the observation to their output.
 
     Args:
         size: Entries of an observation.
-        hidden: Entries of each hidden layer.
+        hidden: Units of each layer.
         activation: One of :data:`TORCH_ACTIVATIONS`.
+        skip: Whether there is a skip connection.
     """
 
-    def __init__(self, size: int, hidden: Sequence[int], activation: str) -> None:
+    def __init__(self, size: int, hidden: Sequence[int], activation: str, skip: bool = True) -> None:
         super().__init__()
         layers: list[nn.Module] = []
         inputs = size
@@ -50,24 +50,71 @@ class Latent(nn.Module):
             layers += [nn.Linear(inputs, outputs), TORCH_ACTIVATIONS[activation]()]
             inputs = outputs
         self.hidden = nn.Sequential(*layers)
-        self.activation = activation
-        self.size = inputs + size
+        # Without hidden layers there is nothing to skip.
+        self.activation, self.skip = activation, skip and bool(hidden)
+        self.size = inputs + size * self.skip
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """(n, self.size) for observations (n, size)."""
-        return torch.cat([self.hidden(observation), observation], dim=-1)
+        hidden: torch.Tensor = self.hidden(observation)
+        return torch.cat([hidden, observation], dim=-1) if self.skip else hidden
+
+
+def linear_layers(modules: Iterable[nn.Module]) -> list[nn.Linear]:
+    """The layers that have weights."""
+    return [module for module in modules if isinstance(module, nn.Linear)]
+
+
+def weights_of(layers: Iterable[nn.Linear]) -> dict[str, tuple[Floats, ...]]:
+    """Arguments ``weights`` and ``biases`` of a :class:`~.agents.Network`."""
+    pairs = [(_numpy(layer.weight), _numpy(layer.bias)) for layer in layers]
+    return {"weights": tuple(weight for weight, _ in pairs), "biases": tuple(bias for _, bias in pairs)}
+
+
+@torch.no_grad()
+def load_weights(layers: Iterable[nn.Linear], network: Network) -> None:
+    """Give layers the weights of a network of the same shapes."""
+    for layer, weight, bias in zip(layers, network.weights, network.biases, strict=True):
+        layer.weight.copy_(torch.from_numpy(weight.copy()))
+        layer.bias.copy_(torch.from_numpy(bias.copy()))
+
+
+class TorchNetwork(nn.Module):
+    """A network with its normalization in PyTorch, in the order of operations of :class:`~.agents.Network`.
+
+    Args:
+        network: In NumPy.
+    """
+
+    def __init__(self, network: Network) -> None:
+        super().__init__()
+        self._squash, self._clip, self._normalizes = network.squash, network.clip, network.mean is not None
+        for name, values in zip(("high", "low", "factor"), network.normalization, strict=True):
+            self.register_buffer(name, torch.from_numpy(values.copy()))
+        units = [weight.shape[0] for weight in network.weights]
+        self.latent = HiddenLayers(network.size, units[:-1], network.activation, network.skip)
+        self.head = nn.Linear(self.latent.size, network.action_size)
+        load_weights([*linear_layers(self.latent.hidden), self.head], network)
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """Actions (n, k) in [-1, 1] for observations (n, size)."""
+        if self._normalizes:
+            high, low, factor = (self.get_buffer(name) for name in ("high", "low", "factor"))
+            observation = torch.clamp((observation - high - low) * factor, -self._clip, self._clip)
+        out: torch.Tensor = self.head(self.latent(observation))
+        return torch.tanh(out) if self._squash == "tanh" else torch.clamp(out, -1.0, 1.0)
 
 
 class Actor(nn.Module):
-    """Observation -> standardized -> hidden layers -> [hidden, standardized] -> linear -> reach -> tanh.
+    """Deterministic policy: normalization, hidden layers with a skip connection, output layer, scale, tanh.
 
-    Mean and deviation of the observation and the reach of each action are no weights: they give the weights a
-    scale that a learning rate can be chosen for. Until :meth:`standardize` they change nothing.
+    Mean and deviation of the observation and the scale of each action (``reach``) are not trained. They give
+    the weights a common size, so that one learning rate suits all. They start as 0, 1 and 1.
 
     Args:
         size: Entries of an observation.
         action_size: Entries of an action.
-        hidden: Entries of each hidden layer.
+        hidden: Units of each hidden layer.
         activation: One of :data:`TORCH_ACTIVATIONS`.
     """
 
@@ -77,98 +124,104 @@ class Actor(nn.Module):
 
     def __init__(self, size: int, action_size: int, hidden: Sequence[int], activation: str = "elu") -> None:
         super().__init__()
-        self.latent = Latent(size, hidden, activation)
+        self.latent = HiddenLayers(size, hidden, activation)
         self.head = nn.Linear(self.latent.size, action_size)
         self.register_buffer("mean", torch.zeros(size))
         self.register_buffer("deviation", torch.ones(size))
         self.register_buffer("reach", torch.ones(action_size))
 
+    @property
+    def layers(self) -> list[nn.Linear]:
+        """Hidden layers and output layer."""
+        return [*linear_layers(self.latent.hidden), self.head]
+
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
         """(n, action_size) in (-1, 1) for observations (n, size)."""
-        standard = (observation - self.mean) / self.deviation
-        action: torch.Tensor = torch.tanh(self.reach * self.head(self.latent(standard)))
-        return action
+        normalized = (observation - self.mean) / self.deviation
+        return torch.tanh(self.reach * self.head(self.latent(normalized)))
 
     @torch.no_grad()
-    def standardize(self, mean: torch.Tensor, deviation: torch.Tensor, reach: torch.Tensor) -> None:
-        """Take a standard of observations (size,) and actions (action_size,); what is done stays the same.
+    def set_normalization(self, mean: torch.Tensor, deviation: torch.Tensor, reach: torch.Tensor) -> None:
+        """Set mean and deviation (size,) and scale of actions (action_size,); the policy stays the same.
 
-        Only hidden layers that the last one does not listen to keep their weights: theirs is a beginning.
+        Hidden layers that the output layer does not use yet keep their weights, as an initialization.
         """
-        first, size = self._linear[0], mean.numel()
+        first, size = self.layers[0], mean.numel()
         if first is not self.head and self.head.weight[:, :-size].any():
-            _see_relative(first.weight, first.bias, mean, deviation)
-        _see_relative(self.head.weight[:, -size:], self.head.bias, mean, deviation)
+            _rescale_input(first.weight, first.bias, mean, deviation)
+        _rescale_input(self.head.weight[:, -size:], self.head.bias, mean, deviation)
         self.head.weight.div_(reach[:, None])
         self.head.bias.div_(reach)
         self.mean.copy_(mean)
         self.deviation.copy_(deviation)
         self.reach.copy_(reach)
 
-    def network(self) -> Network:
-        """The same in NumPy, its standard within its weights."""
-        plain = copy.deepcopy(self)
-        plain._forget_standard()
-        return Network(
-            weights=tuple(_numpy(layer.weight) for layer in plain._linear),
-            biases=tuple(_numpy(layer.bias) for layer in plain._linear),
-            activation=self.latent.activation,  # type: ignore[arg-type]
-            squash="tanh",
-            skip=True,
-        )
-
     @torch.no_grad()
-    def _forget_standard(self) -> None:
-        """Make mean, deviation and reach part of the weights."""
-        first, size = self._linear[0], self.mean.numel()
+    def _fold_normalization(self) -> None:
+        """Make mean, deviation and scale part of the weights."""
+        first, size = self.layers[0], self.mean.numel()
         back = -self.mean / self.deviation, 1.0 / self.deviation
         if first is not self.head:
-            _see_relative(first.weight, first.bias, *back)
-        _see_relative(self.head.weight[:, -size:], self.head.bias, *back)
+            _rescale_input(first.weight, first.bias, *back)
+        _rescale_input(self.head.weight[:, -size:], self.head.bias, *back)
         self.head.weight.mul_(self.reach[:, None])
         self.head.bias.mul_(self.reach)
         self.mean.zero_()
         self.deviation.fill_(1.0)
         self.reach.fill_(1.0)
 
+    def network(self) -> Network:
+        """The same policy in NumPy, with the normalization folded into its weights."""
+        plain = copy.deepcopy(self)
+        plain._fold_normalization()
+        activation: Any = self.latent.activation
+        return Network(**weights_of(plain.layers), activation=activation, squash="tanh", skip=True)
+
     def load(self, network: Network) -> None:
         """Take over the weights of a network.
 
         Raises:
-            DataError: the network is built in another way.
+            DataError: the network has other layers.
         """
         same = network.skip and network.squash == "tanh" and network.mean is None
         same = same and network.activation == self.latent.activation
-        if not same or [w.shape for w in network.weights] != [tuple(x.weight.shape) for x in self._linear]:
+        if not same or [w.shape for w in network.weights] != [tuple(x.weight.shape) for x in self.layers]:
             raise DataError(
                 "initial: the agent's network is built in another way; use its hidden layers and activation, "
                 f"which are {[w.shape[0] for w in network.weights[:-1]]} and {network.activation}"
             )
-        with torch.no_grad():
-            self._forget_standard()
-            for layer, weight, bias in zip(self._linear, network.weights, network.biases, strict=True):
-                layer.weight.copy_(torch.from_numpy(weight.copy()))
-                layer.bias.copy_(torch.from_numpy(bias.copy()))
-
-    @property
-    def _linear(self) -> list[nn.Linear]:
-        return [layer for layer in self.latent.hidden if isinstance(layer, nn.Linear)] + [self.head]
+        self._fold_normalization()
+        load_weights(self.layers, network)
 
 
-def begin_at_rest(actor: Actor, batch: Batch) -> None:
-    """Make an actor a spring and damper to neutral, and nothing else.
+def _rescale_input(
+    weight: torch.Tensor, bias: torch.Tensor, mean: torch.Tensor, deviation: torch.Tensor
+) -> None:
+    """Make a layer on observations one on (observation - mean) / deviation, in place."""
+    bias += weight @ mean
+    weight *= deviation
 
-    So a training begins with a machine that stays in its travel, and moves at all: every gradient is useful.
-    """
-    begin_as(actor, _springs(batch.layout, batch.usual_scale))
+
+def _numpy(tensor: torch.Tensor) -> Floats:
+    array: Floats = tensor.detach().cpu().numpy().copy()
+    return array
 
 
-def begin_as(actor: Actor, gains: NDArray[np.float32]) -> None:
-    """Make an actor linear in the observation; its last layer does not listen to the hidden ones.
+# Initial policies: linear in the observation.
+
+_SPRINGS: Final = {"carriage": 0.3, "hexapod": 1.0}
+"""Natural frequency of spring and damper at the start, rad/s."""
+
+_TURNTABLE_DAMPING: Final = 0.5
+"""Of the turntable at the start, 1/s."""
+
+
+def start_linear(actor: Actor, gains: Floats) -> None:
+    """Make an actor linear in the observation: its output layer ignores the hidden ones.
 
     Args:
-        actor: The network.
-        gains: (action_size, size) of its last layer on the observation.
+        actor: The policy.
+        gains: (action_size, size) from the observation to actions before the tanh.
     """
     with torch.no_grad():
         actor.head.weight.zero_()
@@ -176,8 +229,12 @@ def begin_as(actor: Actor, gains: NDArray[np.float32]) -> None:
         actor.head.bias.zero_()
 
 
-def _springs(layout: Layout, scale: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(9, frame) -w^2 x - 2 w v of each axis, as a share of its largest acceleration."""
+def start_as_spring_damper(actor: Actor, batch: Batch) -> None:
+    """Make an actor a critically damped spring to neutral on each axis: acceleration = -w^2 x - 2 w v.
+
+    Training starts with a machine that moves and stays within its travel, so that every gradient is useful.
+    """
+    layout: Layout = batch.layout
     gains = np.zeros((len(AXES), layout.frame))
     rows = {row.name: row for row in layout.rows}
     for first, position, rate, subsystem in (
@@ -190,159 +247,66 @@ def _springs(layout: Layout, scale: NDArray[np.float64]) -> NDArray[np.float32]:
             gains[first + k, layout.first(position) + k] = -w * w * rows[position].scale
             gains[first + k, layout.first(rate) + k] = -2.0 * w * rows[rate].scale
     gains[8, layout.first("turntable_rate")] = -_TURNTABLE_DAMPING * rows["turntable_rate"].scale
-    moving = scale > 0.0
-    gains[moving] /= scale[moving, None]
+    # As a share of the acceleration that an action of 1 stands for.
+    moving = batch.usual_scale > 0.0
+    gains[moving] /= batch.usual_scale[moving, None]
     gains[~moving] = 0.0
-    return gains.astype(np.float32)
+    start_linear(actor, gains.astype(np.float32))
 
 
-def _see_relative(
-    weight: torch.Tensor, bias: torch.Tensor, mean: torch.Tensor, deviation: torch.Tensor
-) -> None:
-    """Make a layer on observations one on (observation - mean) / deviation, in place."""
-    bias += weight @ mean
-    weight *= deviation
+# Normalization by a rollout. Rows of an observation are scaled to what can happen, and an action of 1 is all
+# the machine can do. A good policy's errors are a hundredth of the one, and its actions of the other.
 
-
-def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:
-    array: NDArray[np.float32] = tensor.detach().cpu().numpy().copy()
-    return array
-
-
-# An actor's steps through a drive and the way back, by hand.
-#
-# For the few rows of a batch this is several times quicker than to build and follow a graph for each step.
-
-
-Floats = NDArray[np.float32]
-
-_ONE: Final = np.ones((), dtype=np.float32)
-_ZERO: Final = np.zeros((), dtype=np.float32)
-
-
-def _slope_of_silu(x: Floats) -> Floats:
-    logistic = _ONE / (_ONE + np.exp(-x))
-    return np.asarray(logistic * (_ONE + x * (_ONE - logistic)))
-
-
-_SLOPES: Final[dict[str, Callable[[Floats], Floats]]] = {
-    "tanh": lambda x: _ONE - np.tanh(x) ** 2,
-    "relu": lambda x: (x > _ZERO).astype(np.float32),
-    "elu": lambda x: np.exp(np.minimum(x, _ZERO)),
-    "silu": _slope_of_silu,
-}
-"""Derivative of each activation."""
-
-
-class ActorSteps:
-    """The steps of an actor, whose weights stay as they are meanwhile.
-
-    Args:
-        actor: The network.
-    """
-
-    def __init__(self, actor: Actor) -> None:
-        layers = [layer for layer in actor.latent.hidden if isinstance(layer, nn.Linear)]
-        self._weights = [layer.weight.detach().numpy() for layer in layers]
-        self._biases = [layer.bias.detach().numpy() for layer in layers]
-        self._mean, self._factor = actor.mean.numpy(), 1.0 / actor.deviation.numpy()
-        reach = actor.reach.numpy()
-        head = actor.head.weight.detach().numpy() * reach[:, None]
-        size = len(self._mean)
-        self._of_hidden, self._of_seen = head[:, :-size], head[:, -size:]
-        self._head_bias = actor.head.bias.detach().numpy() * reach
-        self._activate, self._slope = ACTIVATIONS[actor.latent.activation], _SLOPES[actor.latent.activation]
-        self._steps: list[tuple[list[Floats], Floats]] = []
-
-    def act(self, observation: Floats) -> Floats:
-        """(n, action_size) for observations (n, size); the step is kept for :meth:`back`."""
-        seen = hidden = (observation - self._mean) * self._factor
-        before = []
-        for weight, bias in zip(self._weights, self._biases, strict=True):
-            before.append(hidden @ weight.T + bias)
-            hidden = self._activate(before[-1])
-        out = seen @ self._of_seen.T + self._head_bias
-        if before:
-            out = out + hidden @ self._of_hidden.T
-        action: Floats = np.tanh(out)
-        self._steps.append((before, action))
-        return action
-
-    def back(self, gradient: Floats) -> Floats:
-        """(n, size) gradient with respect to what was seen, of the last step that is kept, which goes.
-
-        Args:
-            gradient: (n, action_size) with respect to its action.
-        """
-        before, action = self._steps.pop()
-        of_out = gradient * (_ONE - action * action)
-        of_seen = of_out @ self._of_seen
-        if before:
-            of_hidden = of_out @ self._of_hidden
-            for weight, x in zip(reversed(self._weights), reversed(before), strict=True):
-                of_hidden = (of_hidden * self._slope(x)) @ weight
-            of_seen = of_seen + of_hidden
-        found: Floats = of_seen * self._factor
-        return found
-
-
-# Observations and actions relative to what they are under a first policy, as a network learns best.
-#
-# The rows of an observation have the scale of what can happen, and an action of 1 is all the machine
-# can do; a
-# good policy's errors are a hundredth of the one, and its actions of the other.
-
-
-_LEAST_SEEN: Final = 0.02
+_LEAST_DEVIATION: Final = 0.02
 """Smallest deviation of an observation: what hardly moves under the first policy may move later."""
 
-_LEAST_TOLD: Final = 0.3
-"""The same of what a machine can do: few are met at first, and others are met later."""
+_LEAST_DEVIATION_OF_MACHINE: Final = 0.3
+"""The same of the rows that describe the machine: few machines are met at first."""
 
-_LEAST_DONE: Final = 0.01
-"""Smallest reach of an action."""
+_LEAST_REACH: Final = 0.01
+"""Smallest scale of an action."""
 
 
-def standardize(actor: Actor, batch: Batch, actions: int) -> None:
-    """Give an actor the standard of what it sees and does as it is.
+def normalize_by_rollout(actor: Actor, batch: Batch, actions: int) -> None:
+    """Normalize an actor by the observations and actions of a rollout of its own.
 
     Args:
-        actor: The network, without a standard so far.
+        actor: The policy, not normalized so far.
         batch: Its environments; they begin anew.
-        actions: How many are taken in each.
+        actions: Length of the rollout.
     """
     everywhere = np.ones(batch.n, dtype=bool)
     batch.begin(everywhere)
     batch.observe(everywhere)
-    seen, done = [], []
+    observations, taken = [], []
     for _ in range(actions):
-        seen.append(batch.arrays.observation.pull().copy())
+        observations.append(batch.arrays.observation.pull().copy())
         with torch.no_grad():
-            done.append(actor(torch.from_numpy(seen[-1])).numpy())
-        batch.write(done[-1])
+            taken.append(actor(torch.from_numpy(observations[-1])).numpy())
+        batch.write(taken[-1])
         batch.step()
-    take_standard(actor, np.concatenate(seen), np.concatenate(done), _least_seen(batch.layout))
+    machine = {row.name for row in MACHINE}
+    least = [
+        _LEAST_DEVIATION_OF_MACHINE if row.name in machine else _LEAST_DEVIATION
+        for row in batch.layout.rows
+        for _ in range(row.size)
+    ]
+    every = np.tile(least, batch.layout.stack)
+    normalize_by(actor, np.concatenate(observations), np.concatenate(taken), every)
 
 
-def _least_seen(layout: Layout) -> NDArray[np.float64]:
-    """(size,) smallest deviation of each entry."""
-    told = {row.name for row in MACHINE}
-    frame = [_LEAST_TOLD if row.name in told else _LEAST_SEEN for row in layout.rows for _ in range(row.size)]
-    return np.tile(frame, layout.stack)
-
-
-def take_standard(
-    actor: Actor, seen: Floats, done: Floats, least: NDArray[np.float64] | float = _LEAST_SEEN
+def normalize_by(
+    actor: Actor, observations: Floats, actions: Floats, least: NDArray[np.float64] | float = _LEAST_DEVIATION
 ) -> None:
-    """Give an actor the standard of what is seen and done in a drive.
+    """Normalize an actor by mean and deviation of observations and the deviation of actions.
 
     Args:
-        actor: The network, without a standard so far.
-        seen: (k, size) observations.
-        done: (k, action_size) actions.
-        least: Smallest deviation of what is seen, (size,) or one for all.
+        actor: The policy, not normalized so far.
+        observations: (k, size).
+        actions: (k, action_size).
+        least: Smallest deviation of an observation, (size,) or one for all.
     """
-    mean, deviation = seen.mean(axis=0, dtype=np.float64), seen.std(axis=0, dtype=np.float64)
-    reach = np.maximum(done.std(axis=0, dtype=np.float64), _LEAST_DONE)
-    standard = mean, np.maximum(deviation, least), reach
-    actor.standardize(*(torch.from_numpy(x).float() for x in standard))
+    deviation = np.maximum(observations.std(axis=0, dtype=np.float64), least)
+    reach = np.maximum(actions.std(axis=0, dtype=np.float64), _LEAST_REACH)
+    values = observations.mean(axis=0, dtype=np.float64), deviation, reach
+    actor.set_normalization(*(torch.from_numpy(value).float() for value in values))

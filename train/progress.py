@@ -1,4 +1,4 @@
-"""What a person sees while an agent is trained: a bar on a terminal, lines elsewhere."""
+"""Progress of trainings: a bar for each on a terminal, and a line for each validation anywhere."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from rich.progress import (
 )
 from typing_extensions import Self
 
-from .experiments.engines import Ending, Job
+from .experiments.engine import Ending, Job
 from .training import Status
 
 
-class Bars:
-    """Bars with speed and time left, none but on a terminal, and a line for each validation.
+class TrainingProgress:
+    """Shows one training (:meth:`tell`), or the jobs of an engine (as its listener).
 
     Args:
+        total: Actions of one training, to show its bar before its first status.
         console: Where to write; default: the error stream.
     """
 
-    def __init__(self, console: Console | None = None) -> None:
+    def __init__(self, total: int | None = None, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True)
         self._bars = Progress(
             TextColumn("{task.description}"),
@@ -41,6 +42,9 @@ class Bars:
             disable=not self._console.is_terminal,
             transient=True,
         )
+        self._tasks: dict[str, TaskID] = {}
+        if total is not None:
+            self._add("training", total)
 
     def __enter__(self) -> Self:
         """Show bars."""
@@ -53,33 +57,32 @@ class Bars:
         """Remove them."""
         self._bars.stop()
 
-    def _add(self, name: str, total: int) -> TaskID:
-        return self._bars.add_task(name, total=total, rate="")
-
-    def _move(self, task: TaskID, status: Status, before: str = "") -> None:
-        """Move a bar to where a training is, and write a line if there is news."""
-        speed = next((bar.speed for bar in self._bars.tasks if bar.id == task), None)
-        rate = f"{speed:,.0f} a second" if speed else ""
-        self._bars.update(task, completed=status.steps, rate=rate)
-        if status.news:
-            self._console.print(f"{before}{line_of(status)}", highlight=False, soft_wrap=True)
-
-
-class TrainingProgress(Bars):
-    """What is seen of one training.
-
-    Args:
-        total: Actions in all.
-        console: Where to write; default: the error stream.
-    """
-
-    def __init__(self, total: int, console: Console | None = None) -> None:
-        super().__init__(console)
-        self._task = self._add("training", total)
+    def _add(self, name: str, total: int) -> None:
+        self._tasks[name] = self._bars.add_task(name, total=total, rate="")
 
     def tell(self, status: Status) -> None:
-        """Move the bar, and write a line if there is news."""
-        self._move(self._task, status)
+        """Where the one training is."""
+        self._show("training", status, "")
+
+    def told(self, job: Job, status: Status) -> None:
+        """Where a job is."""
+        self._show(job.name, status, f"{job.name}: ")
+
+    def ended(self, job: Job, ending: Ending) -> None:
+        """Remove a job's bar."""
+        task = self._tasks.pop(job.name, None)
+        if task is not None:
+            self._bars.remove_task(task)
+
+    def _show(self, name: str, status: Status, before: str) -> None:
+        """Move a bar, and write a line if there was a validation."""
+        if name not in self._tasks:
+            self._add(name, status.total)
+        task = self._tasks[name]
+        speed = next((bar.speed for bar in self._bars.tasks if bar.id == task), None)
+        self._bars.update(task, completed=status.steps, rate=f"{speed:,.0f} a second" if speed else "")
+        if status.news:
+            self._console.print(f"{before}{line_of(status)}", highlight=False, soft_wrap=True)
 
 
 def line_of(status: Status) -> str:
@@ -92,30 +95,3 @@ def line_of(status: Status) -> str:
         f"perceived {score.perceived_error:.2f}, reward {score.reward:.2f}, "
         f"limited {100.0 * score.limited:.2f} %"
     )
-
-
-# What a person sees while several agents are trained: bars, and a line for each validation.
-
-
-class FleetProgress(Bars):
-    """See :class:`~.engine.job.Listener`.
-
-    Args:
-        console: Where to write; default: the error stream.
-    """
-
-    def __init__(self, console: Console | None = None) -> None:
-        super().__init__(console)
-        self._tasks: dict[str, TaskID] = {}
-
-    def told(self, job: Job, status: Status) -> None:
-        """Move a training's bar, and write a line if there is news."""
-        if job.name not in self._tasks:
-            self._tasks[job.name] = self._add(job.name, status.total)
-        self._move(self._tasks[job.name], status, f"{job.name}: ")
-
-    def ended(self, job: Job, ending: Ending) -> None:
-        """Remove a training's bar."""
-        task = self._tasks.pop(job.name, None)
-        if task is not None:
-            self._bars.remove_task(task)

@@ -1,19 +1,25 @@
-"""What an algorithm has to offer, so that run directory, log, validation and checkpoints work with it."""
+"""Algorithms by name, and what an algorithm has to offer: a :class:`Learner`.
+
+Run folder, log, validation, checkpoints, seeds, searches and populations then work with it. Another package
+adds its own by ``motion_cueing.train.register``, or by an entry point::
+
+    [project.entry-points."motion_cueing.algorithms"]
+    my-algorithm = "my_package.algorithm:MyLearner"
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from ..envs.errors import ConfigurationError, DataError, UnknownNameError
-from .agents import Network
+from ..envs.errors import DataError
+from ..envs.registry import Registry
 
 if TYPE_CHECKING:
+    from .agents import Network
     from .config import TrainingConfig
 
 Boundary = Callable[[], None]
@@ -36,142 +42,105 @@ def restoring() -> Iterator[None]:
     """
     try:
         yield
-    except (IndexError, KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (IndexError, KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
+        if isinstance(error, DataError):
+            raise
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise DataError(f"the checkpoint is of another configuration or version ({reason})") from None
 
 
-class Learner(Protocol):
-    """An algorithm in the middle of its work."""
+class Learner(ABC):
+    """An algorithm in the middle of its work.
+
+    Args:
+        config: The training.
+
+    Attributes:
+        preset: YAML file with the default configuration; None for the defaults of ``TrainingConfig``.
+    """
+
+    preset: ClassVar[Path | None] = None
+
+    @abstractmethod
+    def __init__(self, config: TrainingConfig) -> None: ...
 
     @property
+    @abstractmethod
     def steps(self) -> int:
         """Actions so far, over all environments."""
-        ...
 
+    @abstractmethod
     def learn(self, boundary: Boundary) -> None:
         """Learn until the configuration's steps.
 
         Args:
             boundary: Called before each round of experience, where :meth:`state` is everything there is.
         """
-        ...
 
+    @abstractmethod
     def scalars(self) -> dict[str, float]:
         """What there is to log, means since the last call: ``rollout/...``, ``terms/...``, ``train/...``."""
-        ...
 
+    @abstractmethod
     def network(self) -> Network:
         """The deterministic policy as it is now."""
-        ...
 
+    @abstractmethod
     def state(self) -> dict[str, Any]:
         """Everything that :meth:`restore` needs to go on from a boundary as if nothing had happened."""
-        ...
 
+    @abstractmethod
     def restore(self, state: State) -> None:
         """Go on from a state.
 
         Raises:
             DataError: it is of another configuration or version.
         """
-        ...
 
 
-# The algorithms by name; each is a module that is imported only when it is asked for.
+ALGORITHMS: Final = Registry[type[Learner]]("algorithm", "motion_cueing.algorithms")
+"""Algorithms that ``--algo`` takes; their modules are imported when they are asked for."""
+
+_SHIPPED: Final = "motion_cueing.train.algorithms"
+for _name, _place, _summary in (
+    ("ppo", "sb3.sb3:SB3Learner", "proximal policy optimization"),
+    ("sac", "sb3.sb3:SB3Learner", "soft actor-critic"),
+    ("td3", "sb3.sb3:SB3Learner", "twin delayed deep deterministic policy gradient"),
+    ("tqc", "sb3.sb3:SB3Learner", "truncated quantile critics"),
+    ("apg", "apg.apg:ApgLearner", "analytic policy gradient, through the simulator"),
+    ("dagger", "dagger.dagger:DaggerLearner", "imitation of a controller, with dataset aggregation"),
+    ("linear", "linear.linear:LinearLearner", "the best linear washout, by evolution: a start for apg"),
+):
+    ALGORITHMS.register(_name, f"{_SHIPPED}.{_place}", _summary)
 
 
-_PRESETS: Final = Path(__file__).parent / "presets"
-
-
-@dataclass(frozen=True)
-class Algorithm:
-    """A way to train.
+def register(
+    name: str, learner: type[Learner] | str, description: str = "", *, replace: bool = False
+) -> None:
+    """Add an algorithm, which ``train --algo NAME`` then takes.
 
     Args:
         name: As ``--algo`` takes it.
-        module: Its module, by full name; has ``make_learner(config) -> Learner``.
-        summary: One line.
-        needs: Modules of other projects that it imports.
-        preset: YAML file with its default configuration; None for ``presets/NAME.yaml`` of this package.
+        learner: The class, or ``"module:attribute"`` where to find it.
+        description: One line for lists.
+        replace: Whether it takes the place of one of the same name.
+
+    Raises:
+        ConfigurationError: the name is not one word, or is taken.
     """
-
-    name: str
-    module: str
-    summary: str
-    needs: tuple[str, ...] = ("torch", "stable_baselines3")
-    preset: Path | None = None
-
-
-_SB3: Final = "motion_cueing.train.algorithms.sb3.learner"
-_CONTRIB: Final = ("torch", "stable_baselines3", "sb3_contrib")
-_ALGORITHMS: Final[dict[str, Algorithm]] = {}
-
-
-def register(algorithm: Algorithm) -> None:
-    """Add an algorithm; one with the same name is replaced."""
-    _ALGORITHMS[algorithm.name] = algorithm
-
-
-for _algorithm in (
-    Algorithm("ppo", _SB3, "proximal policy optimization"),
-    Algorithm("sac", _SB3, "soft actor-critic"),
-    Algorithm("td3", _SB3, "twin delayed deep deterministic policy gradient"),
-    Algorithm("tqc", _SB3, "truncated quantile critics", _CONTRIB),
-    Algorithm(
-        "apg",
-        "motion_cueing.train.algorithms.apg.learner",
-        "analytic policy gradient, through the machine",
-        ("torch",),
-    ),
-    Algorithm(
-        "dagger",
-        "motion_cueing.train.algorithms.dagger.learner",
-        "imitation of a controller, with dataset aggregation",
-        ("torch",),
-    ),
-    Algorithm(
-        "linear",
-        "motion_cueing.train.algorithms.linear.learner",
-        "the best linear washout, by evolution: a beginning for apg",
-        ("torch",),
-    ),
-):
-    register(_algorithm)
+    ALGORITHMS.register(name, learner, description, replace=replace)
 
 
 def algorithm_names() -> list[str]:
     """Names ``--algo`` takes."""
-    return list(_ALGORITHMS)
+    return ALGORITHMS.names()
 
 
-def get_algorithm(name: str) -> Algorithm:
-    """An algorithm by name.
+def preset_of(name: str) -> Path | None:
+    """The YAML file with an algorithm's default configuration, or None.
 
     Raises:
         UnknownNameError: no algorithm has this name.
     """
-    if name not in _ALGORITHMS:
-        raise UnknownNameError("algorithm", name, _ALGORITHMS)
-    return _ALGORITHMS[name]
-
-
-def preset_file(algorithm: Algorithm) -> Path:
-    """The YAML file with an algorithm's default configuration."""
-    return algorithm.preset or _PRESETS / f"{algorithm.name}.yaml"
-
-
-def make_learner(config: TrainingConfig) -> Learner:
-    """The learner of a configuration.
-
-    Raises:
-        ConfigurationError: a package is missing, or a hyperparameter is wrong.
-    """
-    algorithm = get_algorithm(config.algo)
-    missing = [name for name in algorithm.needs if find_spec(name) is None]
-    if missing:
-        raise ConfigurationError(
-            f"{config.algo} needs {', '.join(missing)}: pip install 'motion-cueing-gym[train]'"
-        )
-    make: Callable[[TrainingConfig], Learner] = import_module(algorithm.module).make_learner
-    return make(config)
+    shipped = Path(__file__).parent / "presets" / f"{name}.yaml"
+    return shipped if name in ALGORITHMS and shipped.exists() else ALGORITHMS[name].preset

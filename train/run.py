@@ -1,4 +1,8 @@
-"""Checkpoints: one file each, with a checksum, read without executing anything in it."""
+"""The folder of a training: configuration, sessions, log, checkpoints and agents.
+
+A checkpoint is one file with a checksum, read without executing anything in it. A training goes on from the
+last.
+"""
 
 from __future__ import annotations
 
@@ -95,9 +99,6 @@ def _unpacked(value: Any) -> Any:
     if isinstance(value, list):
         return [_unpacked(item) for item in value]
     return value
-
-
-# The folder of a training: configuration, provenance, log, checkpoints and agents.
 
 
 _CONFIG: Final = "config.yaml"

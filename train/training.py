@@ -1,18 +1,23 @@
-"""A training that begins with the network of an agent there is already."""
+"""The training loop: from the start or a checkpoint to the end, with log, validation, checkpoints and agents.
+
+A :class:`Training` makes the learner of its algorithm and calls ``learn``. Between updates the learner calls
+back: then whatever is due happens (:meth:`Training._boundary`). So every algorithm is validated, saved and
+stopped alike.
+"""
 
 from __future__ import annotations
 
-import signal
-import threading
+import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ..baselines import ClassicalWashout
 from ..envs.errors import ConfigurationError
+from ..envs.interrupt import Interrupt
 from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.drives import platform_of
@@ -20,8 +25,8 @@ from .agents import Agent, Network, Record
 from .agents.base_policy import DEFAULT, base_parameters
 from .config import Measure, TrainingConfig
 from .logs import TrainingLog
-from .networks import Actor, begin_at_rest
-from .registry import Learner, StopTraining, make_learner
+from .networks import Actor, start_as_spring_damper
+from .registry import ALGORITHMS, Learner, StopTraining
 from .run import RunFolder
 from .validation import Score, Validation
 
@@ -52,48 +57,38 @@ def initial_network(config: TrainingConfig) -> Network | None:
     return agent.network
 
 
-def begin(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
-    """Give an actor the weights of the initial network, or let it begin at rest where none is named.
+def start_actor(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
+    """Initialize an actor: the network of ``config.initial``, or a spring to neutral where none is named.
 
     Raises:
-        DataError: the agent's file cannot be read, or its network is built in another way.
-        ConfigurationError: that agent sees, does or drives something else.
+        DataError: the agent's file cannot be read, or its network has other layers.
+        ConfigurationError: that agent has another observation, action or platform.
     """
     network = initial_network(config)
     if network is None:
-        begin_at_rest(actor, batch)
+        start_as_spring_damper(actor, batch)
     else:
         actor.load(network)
 
 
-# Ctrl-C as a question that is answered between updates.
+_WARM_UP: Final = 0.1
+"""Share of the training in which the learning rate rises."""
+
+_LEAST_RATE: Final = 0.02
+"""Learning rate at the start and the end, as a share of the largest."""
 
 
-class Interrupt:
-    """Whether Ctrl-C was pressed; the second time it interrupts at once."""
+def warm_cosine(progress: float) -> float:
+    """Learning rate as a share of the largest: linear warm-up in the first tenth, then cosine decay.
 
-    def __init__(self) -> None:
-        self.asked = False
-
-    @contextmanager
-    def caught(self) -> Iterator[None]:
-        """Hold SIGINT back within the block; only the main thread can."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        earlier = signal.signal(signal.SIGINT, self._ask)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, earlier)
-
-    def _ask(self, number: int, frame: Any) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
-
-
-# A training from beginning or checkpoint to its end: log, validation, checkpoints, agents.
+    Args:
+        progress: Share of the training that is done.
+    """
+    progress = min(progress, 1.0)
+    if progress < _WARM_UP:
+        return max(progress / _WARM_UP, _LEAST_RATE)
+    turn = math.pi * (progress - _WARM_UP) / (1.0 - _WARM_UP)
+    return _LEAST_RATE + (1.0 - _LEAST_RATE) * 0.5 * (1.0 + math.cos(turn))
 
 
 Tell = Callable[["Status"], None]
@@ -168,7 +163,7 @@ class Training:
         config = run.config if state is None else replace(run.config, initial=None)
         begun = initial_agent(config)
         self._initial = None if begun is None else begun.record
-        self.learner: Learner = make_learner(config)
+        self.learner: Learner = ALGORITHMS[config.algo](config)
         self.validation = Validation(run.config)
         self._clock, self._seen = _Clock(), -1
         self._interrupt = interrupt or Interrupt()

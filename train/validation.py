@@ -1,4 +1,4 @@
-"""How good an agent is on random drives it is never trained on."""
+"""Validation: cost of the policy on random drives that are never trained on, from neutral to the end."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Score:
 
     Args:
         cue_error: J.
-        perceived_error: J of what is sensed.
+        perceived_error: J of the perceived cues.
         reward: Of the task, an action.
         terms: Every term of the reward by name.
         tilt_rate_peak: Largest roll or pitch rate beyond the car's own at the ends of actions, rad/s.
@@ -128,7 +128,7 @@ def _drive(batch: Batch, act: Act) -> Score:
 
 
 def tilt_rate(state: NDArray[Any]) -> NDArray[np.float64]:
-    """(n,) roll and pitch rate felt beyond the car's own, rad/s, of a simulator's state."""
+    """(n,) roll and pitch rate of the simulator cue beyond the car's own, rad/s, of a simulator's state."""
     reference = np.asarray(state["reference_cue"]["rate"], dtype=np.float64)[:, :2]
     simulated = np.asarray(state["simulator_cue"]["rate"], dtype=np.float64)[:, :2]
     beyond = simulated - np.clip(simulated, np.minimum(reference, 0.0), np.maximum(reference, 0.0))

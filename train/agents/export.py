@@ -20,7 +20,7 @@ from ...envs.settings import to_dict
 from ...envs.storage import write_bytes
 from ...envs.task.observation import abilities, action_scale
 from .agent import Agent
-from .network import Array, Network
+from .network import Array
 
 OPSET: Final = 18
 """Version of ONNX's operators."""
@@ -71,7 +71,9 @@ def export_onnx(agent: Agent, path: str | Path) -> Exported:
         ExportError: a package is missing, or the exported network computes something else.
     """
     torch, onnx, runtime = (_load(name) for name in ("torch", "onnx", "onnxruntime"))
-    module = torch_module(agent.network)
+    from ..networks import TorchNetwork
+
+    module = TorchNetwork(agent.network)
     model = _described(onnx.load_from_string(_exported(torch, module, agent.network.size)), onnx, agent)
     session = _session(runtime, model)
     observations = _observations(agent)
@@ -95,13 +97,6 @@ def export_onnx(agent: Agent, path: str | Path) -> Exported:
         longest=float(seconds.max()),
         size=len(model),
     )
-
-
-def torch_module(network: Network) -> Any:
-    """The network as a ``torch.nn.Module``, in the order of operations of :class:`~.network.Network`."""
-    from .network import TorchNetwork
-
-    return TorchNetwork(network)
 
 
 def _exported(torch: ModuleType, module: Any, size: int) -> bytes:

@@ -1,4 +1,7 @@
-"""How an agent was made."""
+"""An agent's file: safetensors with arrays by name, and JSON with version and checksum as metadata.
+
+It holds the network, the task with its platform, and the record of how the agent was made.
+"""
 
 from __future__ import annotations
 
@@ -53,9 +56,6 @@ class Record:
     initial: Record | None = None
 
 
-# What stands in an agent's file: arrays by name, and the rest as plain values.
-
-
 Arrays = dict[str, NDArray[Any]]
 
 _MEAN: Final = "observation.mean"
@@ -72,8 +72,8 @@ class Contents:
         platform: The machine in full: a name in ``task`` may mean another one later.
         record: How it was made.
         activation: Of the network, as the following.
-        squash: Of its last layer.
-        skip: Whether the last layer sees the observation, too.
+        squash: Of its output layer.
+        skip: Whether there is a skip connection to the output layer.
         clip: Of the normalized observation.
         layers: Of the network.
         base: Washout under the agent.
@@ -165,9 +165,6 @@ def _weight(k: int) -> str:
 
 def _bias(k: int) -> str:
     return f"layers.{k}.bias"
-
-
-# An agent's file: safetensors with one entry of metadata, JSON with version and checksum.
 
 
 SUFFIX: Final = ".safetensors"

@@ -1,16 +1,18 @@
-"""A multilayer perceptron in NumPy: the whole of a trained policy, with the normalization of its input."""
+"""Multilayer perceptron of an agent: its layers, and inference in NumPy.
+
+:class:`Network` is the one declaration of a policy's layers, activations and normalization. NumPy alone runs
+it. ``train/networks.py`` builds the PyTorch forms from it: one to train, one to export.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
-from torch import Tensor, nn
 
 from ...envs.errors import DataError
 
@@ -28,44 +30,50 @@ _ONE: Final = np.ones((), dtype=np.float32)
 _HALF: Final = np.full((), 0.5, dtype=np.float32)
 
 
-def _elu(x: Array) -> Array:
-    return np.maximum(x, _ZERO) + np.expm1(np.minimum(x, _ZERO))
-
-
 def _silu(x: Array) -> Array:
     # x times the logistic function, which overflows nowhere in this form.
     half = _HALF * x
-    silu: Array = half + half * np.tanh(half)
-    return silu
+    return np.asarray(half + half * np.tanh(half))
 
 
-def _relu(x: Array) -> Array:
-    return np.maximum(x, _ZERO)
+def _silu_slope(x: Array) -> Array:
+    logistic = _ONE / (_ONE + np.exp(-x))
+    return np.asarray(logistic * (_ONE + x * (_ONE - logistic)))
 
 
-ACTIVATIONS: Final[Mapping[str, Callable[[Array], Array]]] = {
-    "tanh": np.tanh,
-    "relu": _relu,
-    "elu": _elu,
-    "silu": _silu,
+class ActivationFunctions(NamedTuple):
+    """An activation in NumPy, elementwise: the function and its derivative."""
+
+    function: Callable[[Array], Array]
+    derivative: Callable[[Array], Array]
+
+
+ACTIVATIONS: Final[Mapping[str, ActivationFunctions]] = {
+    "tanh": ActivationFunctions(np.tanh, lambda x: _ONE - np.tanh(x) ** 2),
+    "relu": ActivationFunctions(lambda x: np.maximum(x, _ZERO), lambda x: (x > _ZERO).astype(np.float32)),
+    "elu": ActivationFunctions(
+        lambda x: np.maximum(x, _ZERO) + np.expm1(np.minimum(x, _ZERO)),
+        lambda x: np.exp(np.minimum(x, _ZERO)),
+    ),
+    "silu": ActivationFunctions(_silu, _silu_slope),
 }
-"""What each name of an activation computes."""
+"""Activations by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """From observations to actions in [-1, 1].
+    """Multilayer perceptron from observations to actions in [-1, 1].
 
-    The input is normalized, (x - mean) / sqrt(variance + EPSILON), clipped to +-``clip``, goes through
-    hidden layers with the activation and a last linear layer, and is squashed.
+    The observation is normalized, (x - mean) / sqrt(variance + EPSILON), and clipped to +-``clip``. Hidden
+    layers with an activation follow, then a linear output layer. The output is squashed to [-1, 1].
 
     Args:
         weights: (outputs, inputs) of each layer, float32.
         biases: (outputs,) of each layer, float32.
         activation: Of the hidden layers.
-        squash: "clip" or "tanh" of the last layer.
-        skip: Whether the last layer sees [last hidden layer, normalized observation] instead of the
-            hidden layer alone.
+        squash: "clip" or "tanh", applied to the output layer.
+        skip: Skip connection: the output layer takes [last hidden layer, normalized observation] instead of
+            the last hidden layer alone.
         mean: (size,) mean of the observation, float64; None leaves it as it is.
         variance: (size,) its variance; given with ``mean``.
         clip: Largest absolute value of a normalized observation.
@@ -157,7 +165,7 @@ class Network:
 
     def _forward(self, x: Array) -> Array:
         x = hidden = self._normalized(x)
-        activate = ACTIVATIONS[self.activation]
+        activate = ACTIVATIONS[self.activation].function
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             hidden = activate(hidden.dot(weight.T) + bias)
         if self.skip and len(self.weights) > 1:
@@ -196,56 +204,3 @@ def _array(name: str, value: ArrayLike, rank: int, kind: type[np.floating[Any]])
         raise DataError(f"network: {name} is not finite")
     array.setflags(write=False)
     return array
-
-
-# The network of an agent in PyTorch.
-
-
-_ACTIVATIONS: Final[Mapping[str, Callable[[Tensor], Tensor]]] = {
-    "tanh": torch.tanh,
-    "relu": torch.relu,
-    "elu": nn.functional.elu,
-    "silu": nn.functional.silu,
-}
-
-
-class TorchNetwork(nn.Module):
-    """A network with its normalization; see :class:`~.network.Network`.
-
-    Args:
-        network: In NumPy.
-    """
-
-    def __init__(self, network: Network) -> None:
-        super().__init__()
-        self._activate = _ACTIVATIONS[network.activation]
-        self._squash, self._skip, self._clip = network.squash, network.skip, network.clip
-        self._normalizes = network.mean is not None
-        for name, values in zip(("high", "low", "factor"), network.normalization, strict=True):
-            self.register_buffer(name, torch.from_numpy(values.copy()))
-        self.layers = nn.ModuleList(map(_linear, network.weights, network.biases))
-
-    def forward(self, observation: Tensor) -> Tensor:
-        """Actions (n, k) in [-1, 1] for observations (n, size)."""
-        x = hidden = self._normalized(observation)
-        *first, last = self.layers
-        for layer in first:
-            hidden = self._activate(layer(hidden))
-        if self._skip and first:
-            hidden = torch.cat([hidden, x], dim=-1)
-        out: Tensor = last(hidden)
-        return torch.tanh(out) if self._squash == "tanh" else torch.clamp(out, -1.0, 1.0)
-
-    def _normalized(self, x: Tensor) -> Tensor:
-        if not self._normalizes:
-            return x
-        high, low, factor = (self.get_buffer(name) for name in ("high", "low", "factor"))
-        return torch.clamp((x - high - low) * factor, -self._clip, self._clip)
-
-
-def _linear(weight: NDArray[Any], bias: NDArray[Any]) -> nn.Linear:
-    layer = nn.Linear(weight.shape[1], weight.shape[0])
-    with torch.no_grad():
-        layer.weight.copy_(torch.from_numpy(weight.copy()))
-        layer.bias.copy_(torch.from_numpy(bias.copy()))
-    return layer

@@ -1,8 +1,10 @@
-"""Population based training: who goes on from whom, and with which values.
+"""Population based training: hyperparameters that change while a population is trained.
 
-Jaderberg et al., "Population Based Training of Neural Networks", 2017, arXiv:1711.09846: truncation selection
-(section 4.1.1: the worst take over weights and values of the best) and exploration by perturbing or drawing
-anew. Everything drawn comes from the generator that is given.
+Jaderberg et al., "Population Based Training of Neural Networks", 2017, arXiv:1711.09846, in generations.
+Truncation selection (section 4.1.1): the worst take over weights and values of the best. Exploration: values
+are perturbed or drawn anew. Each member of a generation has a folder of its own, which starts from the last
+checkpoint of its parent in the generation before. Nothing is written over, so that a population that was
+stopped goes on to the same bits.
 """
 
 from __future__ import annotations
@@ -25,8 +27,8 @@ from ...envs.storage import copy_file, write_text
 from ..config import Choice, PopulationOptions, TrainingConfig
 from ..run import RunFolder, free_folder
 from ..training import rating
-from .engines import Ending, Engine, Listener, run_jobs
-from .jobs import TrainingJob
+from .engine import Ending, Engine, Listener, run_jobs
+from .job import TrainingJob
 from .search import check_space, varied
 
 Values = dict[str, Any]
@@ -34,8 +36,8 @@ Values = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Descent:
-    """How a member of the next generation begins.
+class Successor:
+    """How a member of the next generation starts.
 
     Args:
         parent: The member of this generation whose checkpoint it goes on from.
@@ -47,7 +49,7 @@ class Descent:
 
 
 def draw(space: Mapping[str, Choice], random: np.random.Generator) -> Values:
-    """Values of a member at the beginning."""
+    """Values of a member at the start."""
     return {name: _drawn(choice, random) for name, choice in space.items()}
 
 
@@ -57,7 +59,7 @@ def next_generation(
     space: Mapping[str, Choice],
     options: PopulationOptions,
     random: np.random.Generator,
-) -> list[Descent]:
+) -> list[Successor]:
     """Who goes on from whom.
 
     Args:
@@ -68,20 +70,21 @@ def next_generation(
         random: Of everything that is drawn.
 
     Returns:
-        A descent for each member: itself with the same values, or, of the worst, one of the best with others.
+        A successor for each member: itself with the same values or, of the worst, one of the best with
+        others.
     """
     finite = [rating if math.isfinite(rating) else math.inf for rating in ratings]
     ranked = sorted(range(len(finite)), key=finite.__getitem__)
     count = max(1, int(options.replaced * len(ranked)))
     best, worst = ranked[:count], set(ranked[-count:])
-    descents = []
+    successors = []
     for member, own in enumerate(values):
         if member not in worst:
-            descents.append(Descent(member, dict(own)))
+            successors.append(Successor(member, dict(own)))
             continue
         parent = int(random.choice(best))
-        descents.append(Descent(parent, explored(values[parent], space, options, random)))
-    return descents
+        successors.append(Successor(parent, explored(values[parent], space, options, random)))
+    return successors
 
 
 def explored(
@@ -105,7 +108,7 @@ def _drawn(choice: Choice, random: np.random.Generator) -> Any:
     found = (
         math.exp(random.uniform(math.log(low), math.log(high))) if choice.log else random.uniform(low, high)
     )
-    return _within(found, choice)
+    return _clamped(found, choice)
 
 
 def _near(value: Any, choice: Choice, options: PopulationOptions, random: np.random.Generator) -> Any:
@@ -116,19 +119,12 @@ def _near(value: Any, choice: Choice, options: PopulationOptions, random: np.ran
     if choice.integer and round(moved) == value:
         # Small whole numbers would stay where they are.
         moved = value + math.copysign(1.0, moved - value)
-    return _within(moved, choice)
+    return _clamped(moved, choice)
 
 
-def _within(value: float, choice: Choice) -> float | int:
+def _clamped(value: float, choice: Choice) -> float | int:
     held = min(max(value, choice.low or 0.0), choice.high or 0.0)
     return round(held) if choice.integer else held
-
-
-# Population based training: hyperparameters that change while a population is trained.
-#
-# Generation by generation. Each member of a generation has a folder of its own, which begins with the last
-# checkpoint of its parent in the generation before; nothing is ever written over, so what was stopped
-# goes on.
 
 
 _CONFIG: Final = "config.yaml"
@@ -236,7 +232,7 @@ class Population:
             if len(self.generations) >= self.total:
                 self._finish()
                 return False
-            self._descend()
+            self._next_generation()
 
     def jobs(self) -> list[TrainingJob]:
         """What there is to do in the latest generation."""
@@ -266,7 +262,7 @@ class Population:
     def _note(self, endings: Mapping[str, Ending]) -> None:
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]
         if wrong:
-            raise DataError(f"failed: {'; '.join(wrong)}; --resume {self.path} tries again")
+            raise DataError(f"failed: {'; '.join(wrong)}; the same command tries again")
         latest = self.generations[-1]
         for i, member in enumerate(latest):
             status = endings[f"member-{i}"].result.status
@@ -276,14 +272,14 @@ class Population:
         self._save()
         self._forget_checkpoints(len(self.generations) - 1)
 
-    def _descend(self) -> None:
+    def _next_generation(self) -> None:
         """The next generation."""
         latest = self.generations[-1]
         ratings = [math.inf if member.rating is None else member.rating for member in latest]
         random = self._random(len(self.generations))
         values = [member.values for member in latest]
-        descents = next_generation(ratings, values, self.config.search, self.options, random)
-        self.generations.append([Member(descent.values, descent.parent) for descent in descents])
+        successors = next_generation(ratings, values, self.config.search, self.options, random)
+        self.generations.append([Member(successor.values, successor.parent) for successor in successors])
         self._save()
 
     def _forget_checkpoints(self, number: int) -> None:
@@ -311,8 +307,9 @@ class Population:
         table.writerow(["generation", "member", "parent", "rating", "best", *names])
         for number, members in enumerate(self.generations, start=1):
             for i, member in enumerate(members):
-                told = (member.parent, member.rating, member.best)
-                row = ["" if value is None else value for value in told]
+                row = [
+                    "" if value is None else value for value in (member.parent, member.rating, member.best)
+                ]
                 table.writerow([number, i, *row, *(member.values[name] for name in names)])
         write_text(self.path / _TABLE, text.getvalue())
 

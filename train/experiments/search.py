@@ -1,9 +1,15 @@
-"""What searches and populations vary: fields of a configuration by their path, and what they may be."""
+"""Hyperparameter search: many short trainings, drawn by Optuna's TPE; the hopeless ones are pruned.
+
+A search varies fields of a configuration by their path, as ``hyperparameters.learning_rate``; so do
+populations. Its folder holds Optuna's journal, a folder for each trial, a table, and the best configuration.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +17,8 @@ from typing import Any, Final
 
 import numpy as np
 import optuna
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
 from ...envs.errors import ConfigurationError, DataError
@@ -18,9 +26,19 @@ from ...envs.settings import from_dict, load, save, to_dict
 from ...envs.storage import write_text
 from ..config import Choice, TrainingConfig
 from ..run import free_folder
-from ..training import Status
-from .engines import Ending, Engine, Job, Listener
-from .jobs import JOURNAL, TrialJob, create_study, load_study
+from ..training import Status, rating
+from .engine import Ending, Engine, Job, Listener
+from .job import TrainingJob
+
+JOURNAL: Final = "search.journal"
+"""File with all trials, beside their folder."""
+
+_STUDY: Final = "training"
+_TRIALS: Final = "trials"
+_CONFIG: Final = "config.yaml"
+_TABLE: Final = "results.csv"
+_BEST: Final = "best.yaml"
+_FINISHED: Final = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
 def varied(config: TrainingConfig, values: Mapping[str, Any], **fields: Any) -> TrainingConfig:
@@ -82,15 +100,6 @@ def _set(values: dict[str, Any], path: str, value: Any) -> None:
     values[last_name] = value
 
 
-# A search for hyperparameters: many short trainings, the hopeless ones broken off early.
-
-
-_CONFIG: Final = "config.yaml"
-_TABLE: Final = "results.csv"
-_BEST: Final = "best.yaml"
-_FINISHED: Final = (TrialState.COMPLETE, TrialState.PRUNED)
-
-
 class Search:
     """A search in its folder; what is there already counts.
 
@@ -115,7 +124,8 @@ class Search:
         """
         search = cls(free_folder(path, f"{config.algo}-search"), config)
         save(config, search.path / _CONFIG)
-        create_study(search.path)
+        (search.path / _TRIALS).mkdir(exist_ok=True)
+        search._study(optuna.create_study)
         return search
 
     @classmethod
@@ -131,11 +141,18 @@ class Search:
 
     def study(self) -> optuna.Study:
         """The study; a session does not repeat what an earlier one drew."""
-        study = load_study(self.path)
+        study = self._study(optuna.load_study)
         entropy = (self.config.seed, len(study.trials))
         seed = int(np.random.SeedSequence(entropy).generate_state(1)[0])
         study.sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
         return study
+
+    def _study(self, make: Callable[..., optuna.Study]) -> optuna.Study:
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        storage = JournalStorage(JournalFileBackend(str(self.path / JOURNAL)))
+        return make(
+            storage=storage, study_name=_STUDY, pruner=optuna.pruners.MedianPruner(n_startup_trials=4)
+        )
 
     def run(self, trials: int, engine: Engine, listener: Listener) -> bool:
         """Train until there are ``trials`` results; returns whether Ctrl-C stopped it.
@@ -148,10 +165,10 @@ class Search:
         finally:
             self.report()
 
-    def job(self, trial: FrozenTrial | optuna.Trial, params: Mapping[str, Any]) -> TrialJob:
+    def job(self, trial: FrozenTrial | optuna.Trial) -> TrainingJob:
         """The training of a trial."""
-        config = self._config_with(self._values(params))
-        return TrialJob(trial.number, trial._trial_id, self.path.resolve(), config)
+        folder = self.path.resolve() / _TRIALS / f"{trial.number:04d}"
+        return TrainingJob(f"trial {trial.number}", folder, self._config_with(self._values(trial.params)))
 
     def _values(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
         """Values of what was drawn: of choices, Optuna is only told the place."""
@@ -166,7 +183,7 @@ class Search:
 
     def report(self) -> None:
         """Write the table of all trials, and the configuration of the best."""
-        trials = load_study(self.path).get_trials(deepcopy=False)
+        trials = self._study(optuna.load_study).get_trials(deepcopy=False)
         names = list(self.config.search)
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
@@ -184,7 +201,7 @@ class Search:
 
     def best(self) -> Any:
         """The best trial, or None while there is none."""
-        trials = load_study(self.path).get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+        trials = self._study(optuna.load_study).get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
         return min(trials, key=lambda trial: float(trial.value or 0.0)) if trials else None
 
     @property
@@ -194,7 +211,7 @@ class Search:
 
 
 class _Session:
-    """Draws trials for an engine, and notes what came of them."""
+    """Draws trials for an engine, prunes them, and notes their results."""
 
     def __init__(self, search: Search, trials: int, listener: Listener) -> None:
         self._search, self._listener = search, listener
@@ -207,36 +224,53 @@ class _Session:
         for trial in [trial for trial in self._begun if len(trial.params) < len(search.config.search)]:
             self._study.tell(trial.number, state=TrialState.FAIL)
             self._begun.remove(trial)
+        self._trials: dict[str, optuna.Trial] = {}
+        self._pruned: set[str] = set()
 
-    def next_job(self) -> TrialJob | None:
+    def next_job(self) -> TrainingJob | None:
         """The next trial's."""
         if self._left == 0:
             return None
         self._left -= 1
         if self._begun:
-            begun = self._begun.pop(0)
-            return self._search.job(begun, begun.params)
-        trial = self._study.ask()
-        for name, choice in self._search.config.search.items():
-            suggest(trial, name, choice)
-        return self._search.job(trial, trial.params)
+            trial = optuna.Trial(self._study, self._begun.pop(0)._trial_id)
+        else:
+            trial = self._study.ask()
+            for name, choice in self._search.config.search.items():
+                suggest(trial, name, choice)
+        job = self._search.job(trial)
+        self._trials[job.name] = trial
+        return job
 
-    def told(self, job: Job, status: Status) -> None:
-        """Pass on where a trial is."""
+    def told(self, job: Job, status: Status) -> bool:
+        """Pass on where a trial is; returns whether it is hopeless."""
         self._listener.told(job, status)
+        trial, options = self._trials[job.name], job.config.validation
+        if status.score is not None and status.news and status.steps >= options.every:
+            trial.report(rating(status.score, options.best), status.steps // options.every)
+            if status.steps < status.total and trial.should_prune():
+                self._pruned.add(job.name)
+        return job.name in self._pruned
 
     def ended(self, job: Job, ending: Ending) -> None:
-        """Note a result; one that was interrupted stays begun."""
-        assert isinstance(job, TrialJob)
+        """Note a result; a trial that Ctrl-C stopped stays begun."""
+        assert isinstance(job, TrainingJob)
         self._listener.ended(job, ending)
-        tried = ending.result
-        if ending.error is not None:
-            self._study.tell(job.number, state=TrialState.FAIL)
-            print(f"{job.name}: failed ({ending.error})", flush=True)
-        elif not tried.interrupted:
-            state = TrialState.PRUNED if tried.value is None else TrialState.COMPLETE
-            self._study.tell(job.number, tried.value, state)
-            print(f"{job.name}: {_result(tried.value)}", flush=True)
+        number, error = self._trials[job.name].number, ending.error
+        stopped = error is None and ending.result.interrupted
+        if stopped and job.name not in self._pruned:
+            return
+        value = None if error is not None or stopped else ending.result.status.best
+        if error is None and not stopped and not math.isfinite(math.nan if value is None else value):
+            error = "no validation of it is finite"
+        if error is not None:
+            self._study.tell(number, state=TrialState.FAIL)
+            print(f"{job.name}: failed ({error})", flush=True)
+            return
+        # Checkpoints are of no use any more.
+        shutil.rmtree(job.path / "checkpoints", ignore_errors=True)
+        self._study.tell(number, value, TrialState.PRUNED if stopped else TrialState.COMPLETE)
+        print(f"{job.name}: {'broken off' if stopped else format(value, '.4g')}", flush=True)
 
 
 def is_search(path: Path) -> bool:
@@ -252,7 +286,3 @@ def suggest(trial: optuna.Trial, name: str, choice: Choice) -> None:
         trial.suggest_int(name, int(choice.low or 0), int(choice.high or 0), log=choice.log)
     else:
         trial.suggest_float(name, choice.low or 0.0, choice.high or 0.0, log=choice.log)
-
-
-def _result(value: float | None) -> str:
-    return "broken off" if value is None else f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""One training with several seeds: what it comes to, and how far that is luck."""
+"""Several seeds of one training, with mean and spread of their results; experiments run on an engine."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ...envs.settings import configuration, load, save
 from ...envs.storage import write_text
 from ...envs.task.options import PositiveCount
 from ..config import TrainingConfig
-from ..progress import FleetProgress
+from ..progress import TrainingProgress
 from ..run import RunFolder, free_folder
 from ..training import Outcome
-from .engines import Ending, Engine, Listener, make_engine, run_jobs
-from .jobs import TrainingJob
+from .engine import Ending, Engine, Listener, make_engine, run_jobs
+from .job import TrainingJob
 from .population import Population, is_population
 from .search import Search, is_search
 
@@ -99,9 +99,9 @@ class Seeds:
         self._report(endings)
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]
         if wrong:
-            raise DataError(f"failed: {'; '.join(wrong)}; --resume {self.path} tries again")
-        done = [ending.result.status.best for ending in endings.values() if not ending.result.interrupted]
-        return done, interrupted
+            raise DataError(f"failed: {'; '.join(wrong)}; the same command tries again")
+        results = [ending.result for ending in endings.values()]
+        return [result.status.best for result in results if not result.interrupted], interrupted
 
     def _report(self, endings: dict[str, Ending]) -> None:
         text = io.StringIO()
@@ -134,9 +134,6 @@ def _row(ending: Ending | None) -> list[Any]:
     return [state, status.steps, best, "" if status.score is None else f"{status.score.cue_error:.6g}"]
 
 
-# Trainings on an engine from the command line: run them, and say what came of them.
-
-
 _INTERRUPTED: Final = 130
 _SUCCESS: Final = 0
 
@@ -164,16 +161,16 @@ class Place:
         make_engine(self.engine, self.jobs, self.address)
 
     @contextmanager
-    def open(self) -> Iterator[tuple[Engine, FleetProgress]]:
+    def open(self) -> Iterator[tuple[Engine, TrainingProgress]]:
         """The engine, and what shows its work."""
-        with make_engine(self.engine, self.jobs, self.address) as engine, FleetProgress() as progress:
+        with make_engine(self.engine, self.jobs, self.address) as engine, TrainingProgress() as progress:
             yield engine, progress
 
     @property
     def words(self) -> str:
         """Options that lead here again."""
-        given = {"engine": self.engine if self.engine != "local" else None}
-        given |= {"address": self.address, "jobs": None if self.jobs is None else str(self.jobs)}
+        engine = None if self.engine == "local" else self.engine
+        given = {"engine": engine, "address": self.address, "workers": self.jobs}
         return "".join(f" --{name} {value}" for name, value in given.items() if value is not None)
 
 
@@ -197,7 +194,7 @@ def run_training(folder: RunFolder, place: Place) -> int:
     with place.open() as (engine, progress):
         endings, _ = run_jobs(engine, [job], progress)
     if job.name not in endings:
-        return _stopped(f"--resume {folder.path}{place.words}")
+        return _stopped(f"train --out {folder.path}{place.words}")
     ending = endings[job.name]
     if ending.error is not None:
         raise DataError(ending.error)
@@ -208,7 +205,7 @@ def report_training(folder: RunFolder, outcome: Outcome, words: str = "") -> int
     """Say what came of a training; returns the exit status."""
     steps = outcome.status.steps
     if outcome.interrupted:
-        return _stopped(f"--resume {folder.path}{words}", f" after {steps:,} steps")
+        return _stopped(f"train --out {folder.path}{words}", f" after {steps:,} steps")
     print(f"{folder.final_agent}: the agent after {steps:,} steps")
     if folder.best_agent.exists():
         print(f"{folder.best_agent}: the best on the validation drives")
@@ -220,7 +217,7 @@ def run_search(search: Search, trials: int, place: Place) -> int:
     with place.open() as (engine, progress):
         interrupted = search.run(trials, engine, progress)
     if interrupted:
-        return _stopped(f"--resume {search.path} --search {trials}{place.words}")
+        return _stopped(f"search --out {search.path} --trials {trials}{place.words}")
     best = search.best()
     if best is not None:
         print(f"{search.best_config}: trial {best.number}, {best.value:.4g}")
@@ -232,7 +229,7 @@ def run_seeds(seeds: Seeds, place: Place) -> int:
     with place.open() as (engine, progress):
         found, interrupted = seeds.run(engine, progress)
     if interrupted:
-        return _stopped(f"--resume {seeds.path}{place.words}")
+        return _stopped(f"train --out {seeds.path}{place.words}")
     print(f"{seeds.path}: {summary(found)}")
     return _SUCCESS
 
@@ -242,11 +239,11 @@ def run_population(population: Population, place: Place) -> int:
     with place.open() as (engine, progress):
         interrupted = population.run(engine, progress)
     if interrupted:
-        return _stopped(f"--resume {population.path}{place.words}")
+        return _stopped(f"population --out {population.path}{place.words}")
     print(f"{population.best_agent}: the best of {len(population.generations[-1])} members")
     return _SUCCESS
 
 
 def _stopped(words: str, when: str = "") -> int:
-    print(f"stopped{when}; go on with: motion-cueing train {words}", file=sys.stderr)
+    print(f"stopped{when}; go on with: motion-cueing {words}", file=sys.stderr)
     return _INTERRUPTED

@@ -1,24 +1,25 @@
-"""A policy of Stable-Baselines3 with the actor of :mod:`.actor`, so that it can begin with its weights."""
+"""Policies of Stable-Baselines3 as networks of NumPy and back; a policy with a skip connection for PPO."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
+from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
+from sb3_contrib.tqc.policies import TQCPolicy
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.distributions import DiagGaussianDistribution, Distribution
-from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.sac.policies import SACPolicy
+from stable_baselines3.td3.policies import TD3Policy
 from torch import nn
 
 from ....envs.errors import DataError
 from ...agents import Network
-from ...networks import TORCH_ACTIVATIONS, Latent
+from ...networks import TORCH_ACTIVATIONS, HiddenLayers, linear_layers, load_weights, weights_of
 
 
 class _ActorAndCritic(nn.Module):
@@ -26,8 +27,8 @@ class _ActorAndCritic(nn.Module):
 
     def __init__(self, size: int, actor: Sequence[int], critic: Sequence[int], activation: str) -> None:
         super().__init__()
-        self.policy_net = Latent(size, actor, activation)
-        self.value_net = Latent(size, critic, activation)
+        self.policy_net = HiddenLayers(size, actor, activation)
+        self.value_net = HiddenLayers(size, critic, activation)
         self.latent_dim_pi, self.latent_dim_vf = self.policy_net.size, self.value_net.size
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -43,7 +44,7 @@ class _ActorAndCritic(nn.Module):
 
 
 class SkipPolicy(ActorCriticPolicy):
-    """Actor and critic whose last layers see the observation, too; the mean action goes through a tanh.
+    """Actor and critic with a skip connection; the mean action goes through a tanh, as in ``networks.Actor``.
 
     It takes the arguments of ``MlpPolicy``; ``net_arch`` is a list, or a mapping with ``pi`` and ``vf``.
     """
@@ -56,18 +57,9 @@ class SkipPolicy(ActorCriticPolicy):
         self.mlp_extractor = extractor.to(self.device)
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
-        # use_sde, which has another distribution, is refused in hyperparameters.py.
+        # use_sde, which has another distribution, is refused in sb3.py.
         assert isinstance(self.action_dist, DiagGaussianDistribution)
         return self.action_dist.proba_distribution(torch.tanh(self.action_net(latent_pi)), self.log_std)
-
-    @property
-    def hidden(self) -> list[nn.Module]:
-        """Hidden layers of the actor, with their activations."""
-        extractor: Any = self.mlp_extractor
-        return list(extractor.policy_net.hidden)
-
-
-# The deterministic policy of a Stable-Baselines3 model as a network that needs no PyTorch, and back.
 
 
 _NAMES = {module: name for name, module in TORCH_ACTIVATIONS.items()}
@@ -81,17 +73,15 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         normalize: The wrapper the model was trained in; its running mean and variance go into the network.
 
     Raises:
-        DataError: the policy is not a chain of linear layers with one kind of activation.
+        DataError: the policy is not a chain of linear layers with one kind of activation, or has a memory.
     """
     layers, squash, skip = _actor(model)
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     mean, variance, clip = None, None, 10.0
     if normalize is not None and normalize.norm_obs:
         statistics: Any = normalize.obs_rms
         mean, variance, clip = statistics.mean.copy(), statistics.var.copy(), float(normalize.clip_obs)
     return Network(
-        weights=tuple(_numpy(layer.weight) for layer in linear),
-        biases=tuple(_numpy(layer.bias) for layer in linear),
+        **weights_of(linear_layers(layers)),
         activation=_activation(layers),  # type: ignore[arg-type]
         squash="tanh" if squash else "clip",
         skip=skip,
@@ -116,7 +106,7 @@ def load_network(
         DataError: the network is built in another way.
     """
     layers, squash, skip = _actor(model)
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    linear = linear_layers(layers)
     ours = ([tuple(layer.weight.shape) for layer in linear], _activation(layers), squash, skip)
     theirs = [w.shape for w in network.weights], network.activation, network.squash == "tanh", network.skip
     if ours != theirs:
@@ -127,10 +117,7 @@ def load_network(
             f"{network.squash}"
         )
     _load_statistics(network, normalize, weight)
-    with torch.no_grad():
-        for layer, values, bias in zip(linear, network.weights, network.biases, strict=True):
-            layer.weight.copy_(torch.from_numpy(values.copy()))
-            layer.bias.copy_(torch.from_numpy(bias.copy()))
+    load_weights(linear, network)
     target = getattr(model.policy, "actor_target", None)
     if target is not None:
         target.load_state_dict(model.policy.actor.state_dict())  # type: ignore[union-attr]
@@ -148,18 +135,31 @@ def _load_statistics(network: Network, normalize: VecNormalize | None, weight: f
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
-    """Layers from the observation to the action; whether a tanh follows, and whether the last sees both."""
+    """Layers from the observation to the action; whether a tanh follows; whether there is a skip connection.
+
+    Raises:
+        DataError: the policy is of another kind.
+    """
     policy: Any = model.policy
-    actor = policy if isinstance(model, OnPolicyAlgorithm) else policy.actor
+    recurrent = isinstance(policy, RecurrentActorCriticPolicy)
+    if recurrent or not isinstance(policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy):
+        reason = (
+            "it has a memory, which no agent has; train PPO, SAC, TD3 or TQC"
+            if recurrent
+            else "it is none of PPO, SAC, TD3 and TQC; make a motion_cueing.train.agents.Network of it"
+        )
+        raise DataError(f"{type(model).__name__}: network_of cannot convert its policy: {reason}")
+    on_policy = isinstance(policy, ActorCriticPolicy)
+    actor = policy if on_policy else policy.actor
     if not isinstance(actor.features_extractor, FlattenExtractor):
         raise DataError("the policy's features extractor is not the plain one; it cannot become a network")
     if isinstance(policy, SkipPolicy):
-        return [*policy.hidden, policy.action_net], True, True
-    if isinstance(model, OnPolicyAlgorithm):
+        return [*policy.mlp_extractor.policy_net.hidden, policy.action_net], True, True
+    if on_policy:
         return [*policy.mlp_extractor.policy_net, policy.action_net], bool(policy.squash_output), False
-    if hasattr(actor, "latent_pi"):
-        return [*_flat(actor.latent_pi), *_flat(actor.mu)], True, False
-    return _flat(actor.mu)[:-1], True, False
+    if isinstance(policy, TD3Policy):
+        return _flat(actor.mu)[:-1], True, False
+    return [*_flat(actor.latent_pi), *_flat(actor.mu)], True, False
 
 
 def _flat(module: nn.Module) -> list[nn.Module]:
@@ -177,8 +177,3 @@ def _activation(layers: Iterable[nn.Module]) -> str:
             f"the policy has layers {found}; a network has one of {', '.join(TORCH_ACTIVATIONS)}{hint}"
         )
     return _NAMES[kinds.pop()]
-
-
-def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:
-    array: NDArray[np.float32] = tensor.detach().cpu().numpy().copy()
-    return array

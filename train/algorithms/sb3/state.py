@@ -1,4 +1,4 @@
-"""Everything a Stable-Baselines3 training consists of, to go on from it bit for bit.
+"""State of a Stable-Baselines3 training: everything that is needed to go on from it bit for bit.
 
 Not in it: PyTorch's generator on a GPU.
 """
@@ -16,8 +16,7 @@ from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise, Vectori
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
-from ....envs.errors import DataError
-from ...registry import State
+from ...registry import State, restoring
 from ...vec_env import DrivingSimulatorVecEnv
 
 _PLAIN: Final = ("num_timesteps", "_n_updates", "_episode_num")
@@ -56,18 +55,13 @@ def restore(
     Raises:
         DataError: the state is of another configuration or version.
     """
-    try:
+    with restoring():
         _restore_model(state, model)
         _restore_replay(state["replay"], model)
         if normalize is not None:
             _restore_statistics(state["normalize"], normalize)
         simulators.restore(state["simulators"])
         restore_random(state, model)
-    except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
-        if isinstance(error, DataError):
-            raise
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise DataError(f"the checkpoint is of another configuration or version ({reason})") from None
 
 
 def _restore_model(state: State, model: BaseAlgorithm) -> None:

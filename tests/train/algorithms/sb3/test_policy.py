@@ -1,0 +1,187 @@
+"""Networks of Stable-Baselines3's models act as the models do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from sb3_contrib import ARS, CrossQ, RecurrentPPO
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.vec_env import VecNormalize
+
+from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.task import ObservationOptions
+from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.train.algorithms.sb3.policy import SkipPolicy, load_network, network_of
+from motion_cueing.train.algorithms.sb3.sb3 import CLASSES, arguments
+from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
+
+from ....envs.task.tasks import SHORT
+
+ROWS = 500
+SIZE = layout_of(ObservationOptions(), "acceleration", 9).size
+
+
+def shaken(model) -> None:
+    """Weights as large as after a training: new ones hardly leave the neighborhood of zero."""
+    generator = torch.Generator().manual_seed(3)
+    with torch.no_grad():
+        for parameter in model.policy.parameters():
+            parameter += 0.2 * torch.randn(parameter.shape, generator=generator)
+
+
+def make(name: str, normalized: bool = True, **policy):
+    """A model with its normalization."""
+    env = DrivingSimulatorVecEnv(2, episode=SHORT)
+    env = VecNormalize(env, clip_obs=3.0) if normalized else env
+    if normalized:
+        rng = np.random.default_rng(1)
+        env.obs_rms.update(rng.normal(0.3, rng.uniform(0.01, 2.0, SIZE), (50, SIZE)))
+    model = CLASSES[name]("MlpPolicy", env, policy_kwargs={"net_arch": [16, 12], **policy}, seed=1)
+    shaken(model)
+    return model, env if normalized else None
+
+
+def observations(size: int) -> np.ndarray:
+    return np.random.default_rng(2).normal(0.0, 2.0, (ROWS, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("normalized", [False, True])
+@pytest.mark.parametrize("name", CLASSES)
+def test_it_predicts_what_the_model_does(name, normalized):
+    model, normalize = make(name, normalized)
+    network = network_of(model, normalize)
+    seen = observations(network.size)
+    expected, _ = model.predict(normalize.normalize_obs(seen) if normalize else seen, deterministic=True)
+    assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
+    inside = np.abs(expected) < 1.0
+    assert inside.mean() > 0.2
+    assert np.std(expected[inside]) > 0.1
+
+
+@pytest.mark.parametrize("activation", [torch.nn.Tanh, torch.nn.ReLU, torch.nn.ELU, torch.nn.SiLU])
+@pytest.mark.parametrize("name", ["ppo", "sac"])
+def test_activations_are_the_models(name, activation):
+    model, normalize = make(name, activation_fn=activation)
+    seen = observations(SIZE)
+    expected, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
+    assert np.allclose(network_of(model, normalize)(seen), expected, rtol=0.0, atol=1e-5)
+
+
+def test_a_policy_whose_last_layer_sees_the_observation_goes_to_a_network_and_back():
+    models = []
+    for seed in (1, 2):
+        env = DrivingSimulatorVecEnv(2, episode=SHORT)
+        models.append(PPO(SkipPolicy, env, policy_kwargs={"net_arch": [16, 12]}, seed=seed))
+        shaken(models[-1])
+    network = network_of(models[0])
+    seen = observations(SIZE)
+    expected, _ = models[0].predict(seen, deterministic=True)
+    assert network.skip
+    assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
+    assert not np.allclose(models[1].predict(seen, deterministic=True)[0], expected, atol=0.01)
+    load_network(network, models[1], None, 1.0)
+    assert np.array_equal(models[1].predict(seen, deterministic=True)[0], expected)
+    # What is sampled scatters around the same mean, and the probability is that of what was sampled.
+    with torch.no_grad():
+        action, _, log_probability = models[1].policy(torch.from_numpy(seen))
+        _, again, _ = models[1].policy.evaluate_actions(torch.from_numpy(seen), action)
+    assert np.allclose(log_probability, again, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_policy_without_hidden_layers_is_one_layer(name):
+    model, normalize = make(name, net_arch=[] if name == "ppo" else [5])
+    network = network_of(model, normalize)
+    assert len(network.weights) == (1 if name == "ppo" else 2)
+    seen = observations(SIZE)
+    expected, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
+    assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
+
+
+def test_the_network_does_not_change_with_the_model():
+    model, normalize = make("ppo")
+    network = network_of(model, normalize)
+    before = network(observations(SIZE))
+    shaken(model)
+    normalize.obs_rms.update(np.ones((10, SIZE)))
+    assert np.array_equal(network(observations(SIZE)), before)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_a_model_takes_over_a_network(name):
+    network = network_of(*make(name))
+    other, normalize = make(name)
+    shaken(other)
+    normalize.obs_rms.update(np.ones((10, SIZE)))
+    assert not np.allclose(network_of(other, normalize)(observations(SIZE)), network(observations(SIZE)))
+    load_network(network, other, normalize, 100.0)
+    assert np.array_equal(network_of(other, normalize)(observations(SIZE)), network(observations(SIZE)))
+    assert normalize.obs_rms.count == 100.0
+    if name == "td3":
+        for one, two in zip(
+            other.policy.actor.parameters(), other.policy.actor_target.parameters(), strict=True
+        ):
+            assert torch.equal(one, two)
+
+
+@pytest.mark.parametrize(
+    ("name", "normalized", "policy", "message"),
+    [
+        ("ppo", True, {"net_arch": [16, 11]}, r"it has hidden layers \[16, 12\] and activation tanh"),
+        ("ppo", True, {"activation_fn": torch.nn.ReLU}, "and activation tanh, and ends with clip"),
+        ("sac", True, {"activation_fn": torch.nn.Tanh}, "ends with clip"),
+        ("ppo", False, {}, "trained with normalize.observation true; set it so"),
+    ],
+)
+def test_a_network_that_does_not_fit_is_not_taken_over(name, normalized, policy, message):
+    network = network_of(*make("ppo"))
+    with pytest.raises(DataError, match=message):
+        load_network(network, *make(name, normalized, **policy), 1.0)
+
+
+class Twice(BaseFeaturesExtractor):
+    """Something a network cannot hold."""
+
+    def __init__(self, space: spaces.Box) -> None:
+        super().__init__(space, space.shape[0])
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return 2.0 * x
+
+
+@pytest.mark.parametrize(
+    ("policy", "message"),
+    [
+        ({"features_extractor_class": Twice}, "features extractor"),
+        ({"activation_fn": torch.nn.Softsign}, "layers Softsign; a network has one of tanh"),
+    ],
+)
+def test_what_a_network_cannot_hold_is_refused(policy, message):
+    model = PPO("MlpPolicy", DrivingSimulatorVecEnv(2, episode=SHORT), policy_kwargs=policy)
+    with pytest.raises(DataError, match=message):
+        network_of(model)
+
+
+def test_noise_that_depends_on_the_state_is_refused_where_the_mean_goes_through_a_tanh():
+    assert arguments(PPO, {"policy": "SkipPolicy"}, 9)["policy"] is SkipPolicy
+    with pytest.raises(ConfigurationError, match=r"hyperparameters\.use_sde"):
+        arguments(PPO, {"policy": "SkipPolicy", "use_sde": True}, 9)
+    with pytest.raises(ConfigurationError, match=r"hyperparameters\.policy"):
+        arguments(SAC, {"policy": "SkipPolicy"}, 9)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "policy", "message"),
+    [
+        (RecurrentPPO, "MlpLstmPolicy", "RecurrentPPO: .* it has a memory, which no agent has; train PPO"),
+        (ARS, "MlpPolicy", "ARS: .* make a motion_cueing.train.agents.Network of it"),
+        (CrossQ, "MlpPolicy", "CrossQ: .* make a motion_cueing.train.agents.Network of it"),
+    ],
+)
+def test_models_of_other_kinds_are_refused_in_one_sentence(algorithm, policy, message):
+    model = algorithm(policy, DrivingSimulatorVecEnv(1, episode=SHORT))
+    with pytest.raises(DataError, match=message):
+        network_of(model)

@@ -1,0 +1,79 @@
+"""A training as a job of an engine, and its folder as part of an experiment."""
+
+from __future__ import annotations
+
+import platform
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from ...envs.errors import DataError, MotionCueingError
+from ...envs.interrupt import Interrupt
+from ...envs.storage import copy_file, write_text
+from ..config import TrainingConfig
+from ..logs import LOG
+from ..run import RunFolder, checkpoints_in
+from ..training import Outcome, Status, Training
+from .engine import Report
+
+_TRACE: Final = "error.txt"
+
+
+@dataclass(frozen=True)
+class TrainingJob:
+    """A training in its folder, or a piece of it.
+
+    Args:
+        name: For people.
+        path: The folder, absolute; the training goes on from what is in it. The one above it exists.
+        config: The training.
+        until: Actions after which it pauses with a checkpoint; None for its end.
+        parent: Folder of the training whose last checkpoint it starts from; None to begin anew.
+    """
+
+    name: str
+    path: Path
+    config: TrainingConfig
+    until: int | None = None
+    parent: Path | None = None
+
+    def run(self, report: Report) -> Outcome:
+        """Train; an outcome is interrupted where it was stopped before ``until``.
+
+        Raises:
+            DataError: the folder is not on this machine, or a checkpoint is damaged.
+            ConfigurationError: the configuration does not fit its algorithm.
+        """
+        if not self.path.parent.is_dir():
+            raise DataError(
+                f"{self.path.parent} is not there on {platform.node()}; "
+                "with a cluster, --out must be on a disk that all machines share"
+            )
+        interrupt = Interrupt()
+
+        def tell(status: Status) -> None:
+            interrupt.asked = report(status) or interrupt.asked or self._paused(status)
+
+        try:
+            run = RunFolder.take_up(self.path, self.config)
+            if self.parent is not None and not checkpoints_in(run.checkpoints):
+                inherit(run, RunFolder(self.parent, self.config))
+            outcome = Training(run, tell, interrupt).train()
+        except MotionCueingError:
+            raise
+        except Exception:
+            write_text(self.path / _TRACE, traceback.format_exc())
+            raise
+        return Outcome(outcome.status, outcome.interrupted and not self._paused(outcome.status))
+
+    def _paused(self, status: Status) -> bool:
+        return self.until is not None and status.steps >= self.until
+
+
+def inherit(run: RunFolder, parent: RunFolder) -> None:
+    """Start a folder from another's log, best agent and, last of all, checkpoint."""
+    (*_, last) = checkpoints_in(parent.checkpoints)
+    for path in (parent.path / LOG, parent.best_agent, last):
+        if path.exists():
+            copy_file(path, run.path / path.relative_to(parent.path))
