@@ -16,7 +16,7 @@ from tyro.conf import FlagCreatePairsOff, Positional, arg
 from ..baselines.tuning.search import Status
 from ..baselines.washout.families import FAMILIES, AnyWashout, algorithm_of, load_of
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.errors import ConfigurationError, DataError
 from ..envs.provenance import command_line, commit, hardware, now, versions
 from ..envs.settings import to_dict
 from ..envs.storage import check_file, write_text
