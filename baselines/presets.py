@@ -1,4 +1,7 @@
-"""Where what takes long to make is kept from one run to the next. The folder may be deleted at any time."""
+"""Parameter sets that come with the package, those of users, and the folder for what takes long to make.
+
+The folder may be deleted at any time.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +24,6 @@ def cache_folder() -> Path:
         return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "motion-cueing"
-
-
-# Parameter sets that come with the package, a YAML file each, and those of users.
 
 
 T = TypeVar("T")

@@ -95,9 +95,9 @@ def results_of(
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),
         summaries=summarize(outcome.metrics, criteria),
-        left_out=outcome.left_out,
+        left_out=outcome.skipped,
         failures=tuple(outcome.failures),
         metrics=outcome.metrics,
-        notes=outcome.notes,
+        notes=outcome.statistics,
         criteria=criteria,
     )

@@ -26,7 +26,7 @@ LADDER: Final = (
     "no-motion",
     "classical",
     "classical-tuned",
-    "classical-ceiling",
+    "classical-per-maneuver",
     "optimal-washout",
     "optimal-washout-tuned",
     "adaptive",

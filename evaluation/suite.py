@@ -18,7 +18,7 @@ from ..envs.errors import ConfigurationError, MotionCueingError
 from .metrics import Criteria, Metrics, measure
 from .reporting.text import how_many
 from .results import Failure
-from .rollout import notes_of
+from .rollout import statistics_of
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -113,8 +113,8 @@ def run_suite(
         drives = {name: drives[name] for name in measured}
         for name, drive in drives.items():
             outcome.metadata.setdefault(name, dict(drive.metadata))
-            if notes_of(drive.metadata):
-                outcome.notes.setdefault(maneuver, {})[name] = notes_of(drive.metadata)
+            if statistics_of(drive.metadata):
+                outcome.notes.setdefault(maneuver, {})[name] = statistics_of(drive.metadata)
         if drives:
             try:
                 finish(maneuver, drives)

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..baselines.interface import Interface, MachineInterface, Machines
+from ..baselines.policy import Policy, Wrapper, as_policy
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.settings import configuration
-from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
-from ..evaluation.rollout import Sample, record, trajectory_of
+from ..envs.simulator.simulator import N_AXES, TIME_STEP
+from ..evaluation.rollout import Rollout, record, trajectory_of
 from ..evaluation.suite import explain
 from ..evaluation.trajectory import Trajectory
 from .inbox import Inbox
@@ -73,14 +74,18 @@ class LoopLog:
             platform: The machine.
             start: (9,) pose it began at.
             vestibular: Perception model by name.
-            policy: For its name, its parameters and its notes.
+            policy: For its name, its parameters and its statistics.
         """
         table = self._table()
-        player = _Player(table, platform, vestibular)
-        cues = player.simulator.drives[0]
-        trajectory = trajectory_of(record(player, start), player, policy, cues, None)
+        machines = Machines([_cues_of(table)], [platform], None, get_vestibular_model(vestibular))
+        run = Rollout(_Replay(as_policy(policy), table[:, _ACTION]), machines, start)
+        trajectory = trajectory_of(record(run), run)
         steps = {f"loop_{state.name.lower()}": str(int((self.states == state).sum())) for state in State}
-        return replace(trajectory, metadata={**trajectory.metadata, **steps})
+        return replace(
+            trajectory,
+            step_time=np.append(math.nan, table[:-1, _SECONDS]),
+            metadata={**trajectory.metadata, **steps},
+        )
 
     def _table(self) -> Floats:
         if not self._chunks:
@@ -88,23 +93,32 @@ class LoopLog:
         return np.concatenate(self._chunks)[: self._rows]
 
 
-class _Player:
-    """The driver that takes the logged steps."""
+class _Replay(Wrapper):
+    """The logged accelerations again, in the name of the policy that asked for them.
 
-    def __init__(self, table: Floats, platform: Platform, vestibular: str) -> None:
-        self._table = table
-        self.simulator = Simulator(
-            platform, _cues_of(table), vestibular=get_vestibular_model(vestibular), dt=TIME_STEP
-        )
+    Args:
+        policy: The policy.
+        actions: (n, 9) accelerations of each step.
+    """
 
-    def begin(self, start: ArrayLike) -> NDArray[Any]:
-        """Put the machine at rest at a pose (9,); returns its state."""
-        return self.simulator.reset(start)[0]  # type: ignore[no-any-return]
+    def __init__(self, policy: Policy, actions: Floats) -> None:
+        super().__init__(policy)
+        self.task, self.time_step, self._actions = None, TIME_STEP, actions
 
-    def samples(self) -> Iterator[Sample]:
-        """One time step after another."""
-        for row in self._table:
-            yield Sample(row[_ACTION], self.simulator.step(row[_ACTION])[0], row[_SECONDS])
+    def connect(self, machines: Machines) -> Interface:
+        """Whatever the policy sees: it only asks for accelerations."""
+        return MachineInterface(machines)
+
+    def predict(
+        self,
+        observation: NDArray[Any],
+        state: Any = None,
+        episode_start: NDArray[Any] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[Any], int]:
+        """The next ones; the state is the number of steps done."""
+        step = 0 if state is None else int(state)
+        return self._actions[step : step + 1], step + 1
 
 
 def _cues_of(table: Floats) -> CueTrace:

@@ -13,7 +13,7 @@ from ...envs.cues import CueTrace
 from ...envs.platform import Platform
 from ...envs.simulator.kernels.observation import read
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
-from ..policy import Array, checked_episode_start, checked_observation, wrong_state
+from ..policy import Array, Information, Policy, checked_episode_start, checked_observation, wrong_state
 from ..symbolic import SymbolicMachine, cs
 from .parameters import MpcParameters, NmpcParameters
 from .prediction import REST, Floats, Forecaster
@@ -160,7 +160,7 @@ class Counts:
 # Model predictive control as a policy.
 
 
-class PredictiveController:
+class PredictiveController(Policy):
     """A policy that makes a plan at every step and does the beginning of it.
 
     Args:
@@ -181,8 +181,10 @@ class PredictiveController:
         configuration: Any = None,
         cues: CueTrace | None = None,
     ) -> None:
-        self.name, self.dt = name, TIME_STEP
+        self.name, self.time_step = name, TIME_STEP
+        self.platform: Platform = platform
         self.parameters = configuration or parameters
+        self.information = Information.ahead(parameters.forecast.preview)
         self._mpc, self._planner = parameters, planner
         self._forecast = Forecaster(planner.grid, parameters.forecast, cues)
         self._brakes = Brakes(platform)
@@ -190,7 +192,7 @@ class PredictiveController:
         self._one_thread = OneThread()
 
     @property
-    def notes(self) -> Mapping[str, str]:
+    def statistics(self) -> Mapping[str, str]:
         """What was counted so far, for a trajectory's metadata."""
         return {f"mpc_{name}": str(value) for name, value in vars(self._counts).items()}
 
@@ -278,7 +280,7 @@ def _checked_state(state: Any, n: int) -> list[Memory] | list[None]:
     return state
 
 
-class PreviewController:
+class PreviewController(Policy):
     """A predictive controller that is told the drive, and looks ahead as far as its preview goes.
 
     Args:
@@ -297,9 +299,11 @@ class PreviewController:
         name: str,
         configuration: Any = None,
     ) -> None:
-        self.name, self.dt = name, TIME_STEP
+        self.name, self.time_step = name, TIME_STEP
+        self.platform: Platform = platform
         self.parameters = configuration or parameters
-        self._platform, self._mpc, self._planner = platform, parameters, planner
+        self.information = Information.ahead(parameters.forecast.preview)
+        self._mpc, self._planner = parameters, planner
 
     def for_drive(self, cues: CueTrace) -> PredictiveController:
         """The policy for one drive.
@@ -307,9 +311,7 @@ class PreviewController:
         Args:
             cues: The drive, at the machine's time step.
         """
-        return PredictiveController(
-            self._platform, self._mpc, self._planner, self.name, self.parameters, cues
-        )
+        return PredictiveController(self.platform, self._mpc, self._planner, self.name, self.parameters, cues)
 
 
 def make_controller(

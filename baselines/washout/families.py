@@ -14,7 +14,7 @@ from ...envs.errors import ConfigurationError, UnknownNameError
 from ...envs.platform.machines import Cab, Platform
 from ...envs.settings import configuration, from_dict, read_yaml
 from ...envs.simulator.simulator import TIME_STEP
-from ..policy import Policy
+from ..policy import WHOLE_DRIVE, Policy
 from ..presets import named
 from .adaptive import AdaptiveParameters, AdaptiveWashout, adaptive_presets, load_adaptive
 from .adaptive.policy import ADAPTIVE
@@ -163,18 +163,15 @@ def kernels_of(parameters: AnyWashout) -> Family:
     return ALGORITHMS[algorithm_of(parameters)].kernels
 
 
-# The classical washout's ceiling: for each standard maneuver the set that is best for it alone.
-#
-# No controller that has to take what comes: it is told which maneuver it is, and has been tuned on it.
-# It says
-# how far the structure of the classical washout reaches.
+# An oracle: for each standard maneuver the parameter set that is best for it alone.
 
 
 _SETS: Final = Path(__file__).parent / "presets" / "per-maneuver"
+PER_MANEUVER: Final = "classical-per-maneuver"
 
 
 @configuration
-class CeilingParameters:
+class PerManeuverParameters:
     """The sets.
 
     Args:
@@ -184,43 +181,44 @@ class CeilingParameters:
     sets: dict[str, WashoutParameters]
 
 
-def ceiling_maneuvers() -> list[str]:
+def tuned_maneuvers() -> list[str]:
     """Names of the maneuvers there are sets for."""
     return sorted(path.stem for path in _SETS.glob("*.yaml"))
 
 
-def load_ceiling(maneuver: str) -> WashoutParameters:
+def load_per_maneuver(maneuver: str) -> WashoutParameters:
     """The best set for a maneuver.
 
     Raises:
         UnknownNameError: there is none.
     """
-    if maneuver not in ceiling_maneuvers():
-        raise UnknownNameError("maneuver of classical-ceiling", maneuver, ceiling_maneuvers())
+    if maneuver not in tuned_maneuvers():
+        raise UnknownNameError(f"maneuver of {PER_MANEUVER}", maneuver, tuned_maneuvers())
     return load_washout(_SETS / f"{maneuver}.yaml")
 
 
-class CeilingWashout:
-    """The classical washout with the best set for the maneuver at hand.
+class PerManeuverWashout(Policy):
+    """The classical washout with the best set for the maneuver at hand: an oracle, not a controller.
 
-    Without a turntable it yaws the cab with the hexapod (k_T = 0), as the paper's EST3: the sets are tuned on
-    a machine with one.
+    It shows how far the structure of the classical washout reaches. Without a turntable it yaws the cab with
+    the hexapod (k_T = 0), as the paper's EST3: the sets are tuned on a machine with one.
 
     Args:
         platform: The machine.
         dt: Time step, s.
     """
 
-    name = "classical-ceiling"
+    name = PER_MANEUVER
+    information = WHOLE_DRIVE
 
     def __init__(self, platform: Platform, dt: float = TIME_STEP) -> None:
-        self.platform, self.dt = platform, dt
-        sets = {name: load_ceiling(name) for name in ceiling_maneuvers()}
+        self.platform, self.time_step = platform, dt
+        sets = {name: load_per_maneuver(name) for name in tuned_maneuvers()}
         if platform.turntable is None:
-            sets = {name: replace(found, turntable_share=0.0) for name, found in sets.items()}
-        self.parameters = CeilingParameters(sets)
+            sets = {name: replace(tuned, turntable_share=0.0) for name, tuned in sets.items()}
+        self.parameters: PerManeuverParameters = PerManeuverParameters(sets)
 
-    def for_drive(self, cues: CueTrace) -> ClassicalWashout:
+    def for_drive(self, cues: CueTrace) -> Policy:
         """The washout for a maneuver, found by the name of its cues.
 
         Raises:
@@ -228,5 +226,5 @@ class CeilingWashout:
         """
         sets = self.parameters.sets
         if cues.name not in sets:
-            raise UnknownNameError("maneuver of classical-ceiling", cues.name, sets)
-        return ClassicalWashout(replace(sets[cues.name], name=self.name), self.platform.cab, self.dt)
+            raise UnknownNameError(f"maneuver of {self.name}", cues.name, sets)
+        return ClassicalWashout(replace(sets[cues.name], name=self.name), self.platform.cab, self.time_step)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Final, Generic, Protocol, TypeVar
 
@@ -12,11 +12,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from ...envs.arrays import real, vec3, vec9
-from ...envs.platform.machines import Cab
+from ...envs.platform.machines import Cab, Platform
 from ...envs.settings import Vector2, Vector3
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
-from ..policy import Array, checked_episode_start, checked_observation, wrong_state
+from ..policy import Array, Policy, checked_episode_start, checked_observation, wrong_state
 from .kernels.blocks import HighPassParameters, Memory, Parameters, initial_memory
 from .kernels.launch import drive_kernel, predict_kernel
 from .kernels.step import washout
@@ -34,6 +34,11 @@ class FamilyParameters(Protocol):
     @property
     def description(self) -> str:
         """One line for people."""
+        ...
+
+    @property
+    def turntable_share(self) -> float:
+        """k_T: 1 turns the cab with the turntable, 0 with the hexapod."""
         ...
 
     @property
@@ -168,7 +173,7 @@ def _as_bytes(memory: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(memory).view(np.uint8)
 
 
-class WashoutPolicy(Generic[P]):
+class WashoutPolicy(Policy, Generic[P]):
     """An algorithm of the washout kind as a policy; its memory is the policy's state.
 
     A subclass says which algorithm it is.
@@ -197,7 +202,7 @@ class WashoutPolicy(Generic[P]):
         self.parameters: P = given if isinstance(given, self.kind) else self.load(given)
         self.name = self.parameters.name
         self.cab = cab or Cab()
-        self.dt = dt
+        self.time_step = dt
         self._start = start_pose(self.parameters)
         self._kernel_parameters = wp.array(
             [self.family.values(self.parameters, self.cab, dt)], dtype=self.family.parameters, device="cpu"
@@ -208,12 +213,19 @@ class WashoutPolicy(Generic[P]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt)
+        return type(self), (self.parameters, self.cab, self.time_step)
 
     @property
-    def start(self) -> Array:
+    def start_pose(self) -> Array:
         """(9,) pose to begin a drive at."""
         return self._start.copy()
+
+    def on(self, platform: Platform) -> Policy:
+        """The washout on a machine; without a turntable it yaws with the hexapod, k_T = 0, as EST3 does."""
+        if platform.turntable is not None or not self.parameters.turntable_share:
+            return self
+        parameters: Any = self.parameters
+        return type(self)(replace(parameters, turntable_share=0.0), platform.cab, self.time_step)
 
     def predict(
         self,
@@ -248,7 +260,7 @@ class WashoutPolicy(Generic[P]):
         return self._buffers_with(n, self._kernel_parameters, parameters_of)
 
     def _buffers_with(self, n: int, parameters: Any, parameters_of: Any) -> _Buffers:
-        self._buffers[n] = _Buffers(self.family, n, parameters, parameters_of, self.dt)
+        self._buffers[n] = _Buffers(self.family, n, parameters, parameters_of, self.time_step)
         return self._buffers[n]
 
 

@@ -17,7 +17,7 @@ from ...envs.platform.kernels.step import LEGS
 from ...envs.platform.machines import Hexapod
 from ...envs.simulator.simulator import Simulator
 from ..metrics import Criteria, cue_error
-from .batch_drivers import BatchDriver
+from ..rollout import Rollout
 from .results import Endured
 
 Floats = NDArray[np.float64]
@@ -244,30 +244,30 @@ def _cues(side: NDArray[Any]) -> Floats:
     return np.hstack([flat["force"], flat["rate"]]).astype(np.float64)
 
 
-def watched(
-    driver: BatchDriver, platform: Platform, tell: Callable[[int], None] = lambda steps: None
+def drive_and_check(
+    run: Rollout, platform: Platform, progress: Callable[[int], None] = lambda steps: None
 ) -> tuple[list[Endured], dict[str, float]]:
     """Drive drives of one length to their end.
 
     Args:
-        driver: At rest at the first sample.
+        run: At the first sample, with actions made finite.
         platform: The machine as it should be.
-        tell: Called now and then with the time steps done since; what it raises ends the drive.
+        progress: Called now and then with the time steps done since; what it raises ends the drive.
 
     Returns:
-        What came of each drive, and of all: the largest use of each limit and the least clearance of
+        The result of each drive, and of all: the largest use of each limit and the least clearance of
         singular poses.
     """
-    watch = Watch(driver.simulator, platform)
-    steps, told = len(driver.simulator.drives[0]) - 1, 0
+    watch = Watch(run.simulator, platform)
+    done = reported = 0
     watch.note()
-    for k, _ in zip(range(1, steps + 1), driver.steps(), strict=False):
+    for done, _ in enumerate(run.steps(), start=1):
         if watch.note():
-            tell(k - told)
-            told = k
+            progress(done - reported)
+            reported = done
     watch.look()
-    tell(steps - told)
-    return _outcomes(watch, driver.not_finite), {**watch.limits.use, "clearance": watch.limits.clearance}
+    progress(done - reported)
+    return _outcomes(watch, run.not_finite), {**watch.limits.use, "clearance": watch.limits.clearance}
 
 
 def _outcomes(watch: Watch, not_finite: NDArray[np.int64]) -> list[Endured]:

@@ -10,7 +10,7 @@ import pytest
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
 from motion_cueing.baselines.washout import families as ceiling
-from motion_cueing.baselines.washout.families import load_ceiling
+from motion_cueing.baselines.washout.families import load_per_maneuver
 from motion_cueing.cli.main import main
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
@@ -126,10 +126,10 @@ def test_a_car_whose_file_has_changed_is_refused(folder, tmp_path, capsys):
 
 
 def test_a_ceiling_of_other_sets_is_refused(folder, monkeypatch, capsys):
-    words = ("--policy", "classical-ceiling", "--maneuver", "sine-with-dwell")
+    words = ("--policy", "classical-per-maneuver", "--maneuver", "sine-with-dwell")
     assert record(*words) == 0
-    edited = replace(load_ceiling("sine-with-dwell"), turntable_share=0.25)
-    monkeypatch.setattr(ceiling, "load_ceiling", lambda name: edited)
+    edited = replace(load_per_maneuver("sine-with-dwell"), turntable_share=0.25)
+    monkeypatch.setattr(ceiling, "load_per_maneuver", lambda name: edited)
     assert record(*words) == 2
     assert "holds drives of another controller" in capsys.readouterr().err
 

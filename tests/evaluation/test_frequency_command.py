@@ -64,7 +64,7 @@ def ladder(monkeypatch):
     """A ladder of three: one that can be tested, one that knows its drives alone, one that fails."""
     monkeypatch.setattr(
         "motion_cueing.evaluation.selection.ladder_names",
-        lambda known: ["no-motion", "classical-ceiling", "adaptive"],
+        lambda known: ["no-motion", "classical-per-maneuver", "adaptive"],
     )
     made = policies.make_policy
     monkeypatch.setattr(
@@ -75,13 +75,16 @@ def ladder(monkeypatch):
 def test_the_ladder_leaves_out_what_knows_no_sinusoids_and_goes_on_after_a_failure(ladder, tmp_path, capsys):
     assert main([*quick("ladder"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
-    assert "left out classical-ceiling: classical-ceiling has a set for each standard maneuver" in shown
+    assert (
+        "left out classical-per-maneuver: classical-per-maneuver has a set for each standard maneuver"
+        in shown
+    )
     assert "failed adaptive: RuntimeError: tired" in shown
     assert [one.policy for one in load_json(tmp_path / "frequency-response.json")] == ["no-motion"]
 
 
 def test_a_policy_that_knows_no_sinusoids_is_refused_before_anything_is_measured(tmp_path, capsys):
-    assert main([*quick("no-motion", "classical-ceiling"), "--out", str(tmp_path / "out")]) == 2
+    assert main([*quick("no-motion", "classical-per-maneuver"), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert "none for sinusoids" in told
     assert "classical-tuned" in told

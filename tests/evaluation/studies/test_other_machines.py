@@ -11,9 +11,12 @@ from motion_cueing.envs.platform import ablation_names, ablations, get_platform,
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.evaluation.rollout import rollout
-from motion_cueing.evaluation.studies.study import moved_to, policy_on
 
-from .studies import PAPER, bend
+from .bends import PAPER, bend
+
+
+def policy_on(name, platform):
+    return make_policy(name, platform, force=True)
 
 
 def test_ablations_lock_what_a_machine_has():
@@ -40,7 +43,7 @@ def test_a_washout_without_turntable_yaws_with_its_hexapod():
     for name in ("classical", "adaptive", "optimal-washout"):
         assert policy_on(name, get_platform("paper-no-turntable")).parameters.turntable_share == 0.0
         assert policy_on(name, PAPER).parameters.turntable_share > 0.0
-    ceiling = policy_on("classical-ceiling", get_platform("paper-no-turntable")).parameters
+    ceiling = policy_on("classical-per-maneuver", get_platform("paper-no-turntable")).parameters
     assert {found.turntable_share for found in ceiling.sets.values()} == {0.0}
     yaw = []
     for fit in (policy_on, make_policy):
@@ -59,6 +62,6 @@ def test_an_agent_is_forced_onto_another_machine():
     assert np.abs(drive_.hexapod).max() > 1e-4
     with pytest.raises(ConfigurationError):
         make_policy("learned-preview", machine)
-    assert moved_to(make_policy("learned-preview", PAPER), machine).platform == machine
+    assert make_policy("learned-preview", PAPER).on(machine).platform == machine
     still = NoMotion()
-    assert moved_to(still, machine) is still
+    assert still.on(machine) is still

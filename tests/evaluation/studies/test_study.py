@@ -12,7 +12,7 @@ from rich.console import Console
 
 from motion_cueing.baselines.washout import families as ceiling
 from motion_cueing.baselines.washout import load_washout
-from motion_cueing.baselines.washout.families import CeilingWashout, load_ceiling
+from motion_cueing.baselines.washout.families import PerManeuverWashout, load_per_maneuver
 from motion_cueing.cli.studies import results_of
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError, DataError
@@ -30,8 +30,8 @@ from motion_cueing.evaluation.studies.results import (
 from motion_cueing.evaluation.studies.store import identity
 from motion_cueing.evaluation.studies.study import Condition, run_study
 
-from .studies import PAPER, SEDAN, bend
-from .synthetic import drive
+from ..synthetic import drive
+from .bends import PAPER, SEDAN, bend
 
 GAINS = {"no-motion": 0.0, "classical-tuned": 0.6, "mine": 0.8, "optimum": 0.95}
 
@@ -198,11 +198,11 @@ def test_a_drive_is_known_by_its_motion_not_its_name(roll, tmp_path):
 
 
 def test_a_ceiling_of_other_sets_is_another_policy(monkeypatch):
-    before = identity("classical-ceiling", CeilingWashout(PAPER))
-    assert identity("classical-ceiling", CeilingWashout(PAPER)) == before
-    edited = replace(load_ceiling("hill"), turntable_share=0.25)
-    monkeypatch.setattr(ceiling, "load_ceiling", lambda name: edited)
-    assert identity("classical-ceiling", CeilingWashout(PAPER)) != before
+    before = identity("classical-per-maneuver", PerManeuverWashout(PAPER))
+    assert identity("classical-per-maneuver", PerManeuverWashout(PAPER)) == before
+    edited = replace(load_per_maneuver("hill"), turntable_share=0.25)
+    monkeypatch.setattr(ceiling, "load_per_maneuver", lambda name: edited)
+    assert identity("classical-per-maneuver", PerManeuverWashout(PAPER)) != before
 
 
 def test_summaries_are_means_with_ratio_and_share(roll, tmp_path):
