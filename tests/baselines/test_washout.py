@@ -29,14 +29,9 @@ from motion_cueing.envs.settings import load, save, to_dict
 from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.evaluation import rollout
 
-from .drives import boundless, trace
+from .drives import boundless, trace, weave
 
 OPEN = (HighPass(), HighPass(), HighPass())
-
-
-def weave(t):
-    ramp = np.clip((t - 0.5) / 2.0, 0.0, 1.0)
-    return ramp[:, None] * np.column_stack([1.5 * np.sin(0.9 * t), 2.0 * np.sin(1.3 * t)])
 
 
 def yawing(t):
@@ -134,7 +129,7 @@ def test_after_a_violent_drive_the_machine_comes_home(name):
     # A HPS of 0.05 rad/s, as EST's, returns from so far in this time to within a meter or two by itself.
     slowest = min((part.frequency for part in policy.parameters.hps if part.order == 2), default=1.0)
     near = 2.0 if slowest <= 0.05 else 0.01
-    assert np.abs(felt.carriage[-1] - policy.start[:2]).max() < near
+    assert np.abs(felt.carriage[-1] - policy.start_pose[:2]).max() < near
     assert np.abs(felt.hexapod[-1, :2]).max() < 0.1
     assert np.abs(felt.hexapod[-1, 2:5]).max() < 1e-3
     # The hexapod's part of the yaw returns as HPR lets it, which with a turntable may be hardly at all.
