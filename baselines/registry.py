@@ -12,14 +12,18 @@ is such a factory. Nothing here imports a controller or Warp before one is made.
 
 from __future__ import annotations
 
+import inspect
+import sys
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import yaml
 
-from ..envs.errors import DataError
+from ..envs.errors import ConfigurationError, DataError
 from ..envs.registry import Registry
 from ..envs.settings import from_dict, read_yaml
 from .presets import named, preset_names
@@ -87,28 +91,77 @@ def make_policy(name: Any, platform: Platform, *, force: bool = False) -> Policy
 
     Args:
         name: Of a registered policy; a file, such as the YAML of a washout or a predictive controller, and
-            whatever else :data:`POLICY_FILES` reads; or any object that :func:`~.policy.as_policy` takes.
+            whatever else :data:`POLICY_FILES` reads; a class or function of one's own as ``module:Class`` or
+            ``file.py:Class``; or any object that :func:`~.policy.as_policy` takes.
         platform: The machine.
         force: Whether a policy that was made for another machine is put on this one as well as it can be.
 
     Raises:
         UnknownNameError: no policy has this name.
         DataError: the file does not exist or cannot be read.
-        ConfigurationError: a field of the file is wrong, or the policy was made for another machine.
+        ConfigurationError: a field of the file is wrong, an object has no ``predict``, or the policy was made
+            for another machine.
     """
     from .policy import as_policy
 
-    kind = Path(name).suffix.removeprefix(".") if isinstance(name, str | Path) else ""
-    if not isinstance(name, str | Path):
-        policy = as_policy(name)
-    elif str(name) not in POLICIES and kind in POLICY_FILES:
-        policy = as_policy(POLICY_FILES[kind](Path(name), platform))
-    elif str(name) not in POLICIES and Path(name).exists():
-        known = ", ".join(f".{ending}" for ending in POLICY_FILES)
-        raise DataError(f"{name}: not a policy; the name of a policy's file ends in one of {known}")
-    else:
-        policy = as_policy(POLICIES[str(name)](platform))
+    policy = as_policy(_made(name, platform))
     return policy.on(platform) if force else policy.for_platform(platform)
+
+
+def _made(name: Any, platform: Platform) -> Any:
+    """What a name or file stands for; anything else is returned."""
+    if not isinstance(name, str | Path):
+        return name
+    text, ending = str(name), Path(name).suffix.removeprefix(".")
+    if text not in POLICIES:
+        if is_reference(text):
+            return _referenced(text, platform)
+        if ending in POLICY_FILES:
+            return POLICY_FILES[ending](Path(name), platform)
+        if Path(name).exists():
+            known = ", ".join(f".{one}" for one in POLICY_FILES)
+            raise DataError(f"{name}: not a policy; the name of a policy's file ends in one of {known}")
+    return POLICIES[text](platform)
+
+
+def is_reference(name: str) -> bool:
+    """Whether a name means an object of the user's: ``module:Class`` or ``file.py:Class``."""
+    return ":" in name
+
+
+def _referenced(name: str, platform: Platform) -> Any:
+    """An object of the user's; a class or function is called to make it.
+
+    It is called with the machine if its first argument is called ``platform``, else without arguments.
+
+    Raises:
+        ConfigurationError: it cannot be imported or made.
+    """
+    module, _, attribute = name.rpartition(":")
+    try:
+        target = getattr(_import(module), attribute)
+        if inspect.isclass(target) or inspect.isroutine(target):
+            first = next(iter(inspect.signature(target).parameters), None)
+            target = target(platform) if first == "platform" else target()
+    except Exception as error:  # It is a user's code.
+        raise ConfigurationError(f"policy {name}: {type(error).__name__}: {error}") from error
+    return target
+
+
+def _import(module: str) -> Any:
+    """A module by name or file."""
+    if not module.endswith(".py"):
+        return import_module(module)
+    if not Path(module).exists():
+        raise FileNotFoundError(f"{module}: there is no such file")
+    spec = spec_from_file_location(Path(module).stem, module)
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = module_from_spec(spec)
+    # Dataclasses and pickles look for the module of their class.
+    sys.modules.setdefault(spec.name, loaded)
+    spec.loader.exec_module(loaded)
+    return loaded
 
 
 # The policies of this package. Factories import what they need.

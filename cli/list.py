@@ -33,11 +33,10 @@ def run(command: ListCommand) -> int:
 
 def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
     """Titles, each with names and one line about each."""
-    from ..baselines import describe_policy
     from ..envs.car import car_names, get_car
     from ..envs.maneuvers import get_maneuver, get_recording, maneuver_names, recording_names
     from ..envs.platform import ablation_names, get_platform, platform_names
-    from ..train.agents import policy_names
+    from ..train.agents import describe_policy, policy_names
 
     return [
         ("Policies", [(name, describe_policy(name)) for name in policy_names()]),

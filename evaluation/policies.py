@@ -6,12 +6,22 @@ from typing import TYPE_CHECKING
 
 from .. import baselines
 from ..baselines import describe_policy, make_policy, policy_names
+from ..baselines.registry import is_reference
 from ..train import agents
+from ..train.agents import find_agent, is_agent
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
 
-__all__ = ["default_policies", "describe_policy", "make_policy", "policy_names"]
+__all__ = [
+    "default_policies",
+    "describe_policy",
+    "find_agent",
+    "is_agent",
+    "is_reference",
+    "make_policy",
+    "policy_names",
+]
 
 
 def default_policies(platform: Platform) -> list[str]:

@@ -212,7 +212,8 @@ class PerManeuverWashout(Policy):
     information = WHOLE_DRIVE
 
     def __init__(self, platform: Platform, dt: float = TIME_STEP) -> None:
-        self.platform, self.time_step = platform, dt
+        self.platform: Platform = platform
+        self.time_step: float = dt
         sets = {name: load_per_maneuver(name) for name in tuned_maneuvers()}
         if platform.turntable is None:
             sets = {name: replace(tuned, turntable_share=0.0) for name, tuned in sets.items()}

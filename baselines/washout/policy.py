@@ -202,7 +202,7 @@ class WashoutPolicy(Policy, Generic[P]):
         self.parameters: P = given if isinstance(given, self.kind) else self.load(given)
         self.name = self.parameters.name
         self.cab = cab or Cab()
-        self.time_step = dt
+        self.time_step: float = dt
         self._start = start_pose(self.parameters)
         self._kernel_parameters = wp.array(
             [self.family.values(self.parameters, self.cab, dt)], dtype=self.family.parameters, device="cpu"

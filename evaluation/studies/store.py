@@ -138,7 +138,8 @@ def identity(given: Any, policy: Policy) -> dict[str, Any]:
         policy: The policy.
     """
     name = given if isinstance(given, str) else policy.name
-    path = Path(name)
+    # Of a class in a file, `file.py:Class`, the file.
+    path = Path(name.rpartition(".py:")[0] + ".py" if ".py:" in name else name)
     return {
         "name": name,
         "file": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,

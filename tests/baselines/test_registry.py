@@ -112,6 +112,28 @@ def test_files_are_read_by_their_ending(tmp_path):
     assert make_policy(tmp_path / "mine.yaml", PAPER).name == "mine"
 
 
+def test_an_object_of_ones_own_by_module_or_file(tmp_path, monkeypatch):
+    (tmp_path / "given.py").write_text(
+        "class Mine:\n"
+        "    def __init__(self, platform): self.name = platform.name\n"
+        "    def predict(self, observation, state=None, episode_start=None, deterministic=True): ...\n"
+        "def made(): return Mine(Mine)\n"
+        "Mine.name = 'class'\n"
+        "ready, broken = made(), 3\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    for module in ("given", str(tmp_path / "given.py")):
+        assert make_policy(f"{module}:Mine", PAPER).name == "paper"
+        assert make_policy(f"{module}:made", PAPER).name == "class"
+        assert make_policy(f"{module}:ready", PAPER).name == "class"
+        with pytest.raises(ConfigurationError, match="no method predict"):
+            make_policy(f"{module}:broken", PAPER)
+        with pytest.raises(ConfigurationError, match="has no attribute 'missing'"):
+            make_policy(f"{module}:missing", PAPER)
+    with pytest.raises(ConfigurationError, match="there is no such file"):
+        make_policy(str(tmp_path / "none.py:Mine"), PAPER)
+
+
 def test_presets_are_described_as_in_their_files():
     assert set(family_presets()) < set(policy_names())
     for name in family_presets():

@@ -7,7 +7,7 @@ them. Attributes are imported when they are first used: a list of names costs no
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .names import agent_names, policy_names
+from .names import agent_names, describe_policy, is_agent, policy_names
 
 if TYPE_CHECKING:
     from .agent import Agent, find_agent, get_agent
@@ -22,7 +22,17 @@ _LAZY = {
     "get_agent": ".agent",
 }
 
-__all__ = ["Agent", "Network", "Record", "agent_names", "find_agent", "get_agent", "policy_names"]
+__all__ = [
+    "Agent",
+    "Network",
+    "Record",
+    "agent_names",
+    "describe_policy",
+    "find_agent",
+    "get_agent",
+    "is_agent",
+    "policy_names",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ...baselines.registry import POLICY_FILES, policy_names, register
+from ...baselines.registry import POLICY_FILES, describe_policy, policy_names, register
 
 if TYPE_CHECKING:
     from ...envs.platform.machines import Platform
     from .agent import Agent
 
-__all__ = ["agent_names", "description_of", "policy_names", "register_agents"]
+__all__ = ["agent_names", "describe_policy", "description_of", "is_agent", "policy_names", "register_agents"]
 
 FOLDER: Final = Path(__file__).parent
 SUFFIX: Final = ".safetensors"
@@ -26,6 +26,11 @@ LENGTH: Final = 8
 def agent_names() -> list[str]:
     """Names of the shipped agents."""
     return sorted(path.stem for path in FOLDER.glob(f"*{SUFFIX}"))
+
+
+def is_agent(name: str) -> bool:
+    """Whether a name or file means an agent."""
+    return name in agent_names() or Path(name).suffix == SUFFIX
 
 
 def description_of(algorithm: str, any_machine: bool, platform: str, mode: str) -> str:
