@@ -177,11 +177,8 @@ class TrueLimits:
         )
 
 
-# What happens in a batch of drives: errors of the cues, use of limits, and limits exceeded.
-
-
 _ROWS: Final = 8192
-"""Time steps of drives that are looked at together: some ten megabytes."""
+"""Time steps of drives that are checked together: some ten megabytes."""
 
 _CHANNELS: Final = (
     ("reference_cue", "simulator_cue", "cue_error"),
@@ -190,7 +187,7 @@ _CHANNELS: Final = (
 
 
 class Watch:
-    """Looks at the states of a simulator, a block of time steps at a time.
+    """Cue errors and limits of a simulator's drives, a block of time steps at a time.
 
     Args:
         simulator: With the drives.
@@ -209,26 +206,26 @@ class Watch:
         self.errors = {name: np.zeros(n) for _, _, name in _CHANNELS}
 
     def note(self) -> bool:
-        """Take the state now; returns whether a block is full and was looked at."""
+        """Take the state now; returns whether a block was full and was checked."""
         # As bytes, which NumPy copies at once; structures it copies field by field.
         self._rows[self._filled].view(np.uint8)[...] = self._simulator.state.view(np.uint8)
         self._filled += 1
         if self._filled < len(self._rows):
             return False
-        self.look()
+        self.check()
         return True
 
-    def look(self) -> None:
-        """Look at what was noted since the last time."""
+    def check(self) -> None:
+        """Check the states noted since the last time."""
         rows, self._filled = self._rows[: self._filled], 0
         if not len(rows):
             return
         self.samples += len(rows)
         self.at_limit += np.count_nonzero(rows["limits"], axis=0)
-        found = self.limits.exceeded(rows["motion"])
-        for kind, flags in found.items():
+        exceeded = self.limits.exceeded(rows["motion"])
+        for kind, flags in exceeded.items():
             self.exceeded[kind] += flags.sum(axis=0)
-        self.beyond += np.any(list(found.values()), axis=0).sum(axis=0)
+        self.beyond += np.any(list(exceeded.values()), axis=0).sum(axis=0)
         for reference, simulated, name in _CHANNELS:
             self.errors[name] += self._errors(rows[reference], rows[simulated])
 
@@ -265,7 +262,7 @@ def drive_and_check(
         if watch.note():
             progress(done - reported)
             reported = done
-    watch.look()
+    watch.check()
     progress(done - reported)
     return _outcomes(watch, run.not_finite), {**watch.limits.use, "clearance": watch.limits.clearance}
 

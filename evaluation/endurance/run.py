@@ -44,7 +44,7 @@ _FRICTION_STREAM: Final = 3
 
 @dataclass(frozen=True, eq=False)
 class SeededDrive:
-    """A drive; everything about it follows from its seed.
+    """A drive and what its seed stands for.
 
     Args:
         seed: Of the drive.
@@ -64,7 +64,7 @@ class SeededDrive:
 def seeded_drives(endurance: Endurance, seeds: Sequence[int]) -> list[SeededDrive]:
     """The drives of seeds; those whose car leaves the range of its model are skipped.
 
-    A car that slides off its path stays: its driver feels that, too.
+    A car that slides off its path stays in: its driver feels that, too.
 
     Raises:
         ConfigurationError: a seed or the duration is out of range.

@@ -1,4 +1,8 @@
-"""The inputs of the objective motion cueing test: one sinusoid on one axis of the car's motion."""
+"""Frequency response of a policy on its machine: the objective motion cueing test of ICAO 9625.
+
+Each axis of the car's motion moves alone, in sinusoids. The response of a simulator cue is its modulus and
+phase over the reference cue. A policy that is not linear has one response for each amplitude.
+"""
 
 from __future__ import annotations
 
@@ -172,13 +176,6 @@ def harmonic(signal: Floats, frequency: float, dt: float) -> tuple[NDArray[np.co
     left = np.sum((about - wave @ fit[2:]) ** 2, axis=0)
     explained = np.divide(total - left, total, out=np.zeros_like(total), where=total > least)
     return fit[2] + 1j * fit[3], explained
-
-
-# The frequency response of a policy on its machine: the objective motion cueing test of ICAO 9625.
-#
-# Each axis of the car's motion is moved alone, in sinusoids; modulus and phase of what the driver feels, on
-# each axis, over what he should feel are the response. A policy that is not linear has one for each
-# amplitude.
 
 
 Complexes = NDArray[np.complex128]

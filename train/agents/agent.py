@@ -81,7 +81,7 @@ class Agent(TaskPolicy):
         return layout_of(self.task.observation, self.task.action.mode, self.action_size)
 
     @property
-    def parameters(self) -> Record:  # type: ignore[override]
+    def parameters(self) -> Record:
         """How it was made, for the record of an evaluation."""
         return self.record
 
@@ -93,7 +93,7 @@ class Agent(TaskPolicy):
         )
 
     @cached_property
-    def base_policy(self) -> ClassicalWashout | None:  # type: ignore[override]
+    def base_policy(self) -> ClassicalWashout | None:
         """The washout that the environment needs as ``base``, or None."""
         return None if self.base is None else make_base(self.base, self.task)
 
