@@ -251,21 +251,23 @@ def frequency_response(
     """Drive a policy with every sinusoid.
 
     Args:
-        policy: A policy, or any object with ``predict``; the axes of a frequency are driven as one batch.
+        policy: A policy, or any object with ``predict``.
         platform: The machine.
         test: Frequencies, amplitudes, durations.
         axes: To be moved, of :data:`~.metrics.CUE_AXES`.
         progress: Told each frequency before it is driven.
     """
     test, policy = test or FrequencyTest(), as_policy(policy).for_platform(platform)
-    found: list[Sinusoid] = []
+    sinusoids: list[Sinusoid] = []
     for frequency in test.frequencies:
         progress(frequency)
         probes = [probe(axis, frequency, test) for axis in axes]
-        for one, motion in zip(probes, _motions(policy, platform, probes), strict=True):
-            found.append(_sinusoid(one, motion, test.amplitude(one.axis, frequency)))
-    found.sort(key=lambda s: (CUE_AXES.index(s.input), s.frequency))
-    return FrequencyResponse(policy.name, platform.name, test, tuple(found))
+        # A network rounds sums of a batch in another way, so agents are driven one axis at a time.
+        for batch in [probes] if policy.task is None else [[one] for one in probes]:
+            for one, motion in zip(batch, _motions(policy, platform, batch), strict=True):
+                sinusoids.append(_sinusoid(one, motion, test.amplitude(one.axis, frequency)))
+    sinusoids.sort(key=lambda s: (CUE_AXES.index(s.input), s.frequency))
+    return FrequencyResponse(policy.name, platform.name, test, tuple(sinusoids))
 
 
 @dataclass(frozen=True, eq=False)
