@@ -2,28 +2,36 @@
 
 A policy sees the machine in every time step of 10 ms, and answers with accelerations of its nine axes::
 
+    import numpy as np
     from motion_cueing.baselines import Policy, register
+    from motion_cueing.envs.simulator.kernels.observation import read
 
     class Damper(Policy):
         name = "damper"
 
         def predict(self, observation, state=None, episode_start=None, deterministic=True):
-            rates = read(observation, "carriage_rate")      # (n, 2) m/s
             action = np.zeros((len(observation), 9))
-            action[:, :2] = -0.5 * rates                    # m/s^2
+            action[:, :2] = -0.5 * read(observation, "carriage_rate")  # (n, 2) m/s -> m/s^2
             return action, state
 
     register("damper", lambda platform: Damper(), "brings the carriage to rest")
 
-``motion_cueing.envs.simulator.kernels.observation`` lists the rows of an observation and has ``read``. The
-limiter of the machine holds back what its actuators cannot do, whatever the policy answers.
+``motion_cueing.envs.simulator.kernels.observation`` lists the rows of an observation. The machine's limiter
+holds back whatever its actuators cannot do. A policy with a memory returns it as the state, and gets it back
+in the next call. It keeps nothing in itself, since one policy may drive many machines side by side.
 
-Everything but ``predict`` has a default. Override ``for_drive`` to be given the drive before it begins, as
-predictive control with preview is. A policy trained in the Gymnasium environment sees that environment's
-observations instead and answers in [-1, 1]: it is a :class:`TaskPolicy`.
+Everything but ``predict`` has a default:
 
-An object that has ``predict`` alone, such as a model of Stable-Baselines3, need not inherit:
-:func:`as_policy` makes it a policy, and every function that takes a policy calls it.
+- ``name``, ``parameters`` and ``statistics`` are for tables and records.
+- ``start_pose`` is the pose a drive begins at, and ``time_step`` the only one the policy can run with.
+- ``for_drive`` gives it the drive beforehand, as predictive control with preview needs.
+- ``for_platform`` refuses a machine it was not made for.
+- ``connect`` decides what it sees and what its actions mean. A :class:`TaskPolicy`, such as an agent, sees
+  the observations of the Gymnasium environment and answers in [-1, 1].
+
+An object that has ``predict`` alone need not inherit: every function that takes a policy calls
+:func:`as_policy`, which adapts it. A model of Stable-Baselines3 is ``as_policy(model, task)``, with the
+``TaskOptions`` of the environment it was trained in.
 """
 
 from __future__ import annotations
@@ -119,7 +127,7 @@ class Policy:
         return self
 
     def for_platform(self, platform: Platform) -> Policy:
-        """The same policy for a machine.
+        """The same policy for a machine; most run on any, or are made for one by their factory.
 
         Raises:
             ConfigurationError: it was made for another machine.
@@ -306,6 +314,10 @@ class OneEach(Policy):
     def start_pose(self) -> Array:
         """(n, 9) pose of each."""
         return np.array([policy.start_pose for policy in self._policies])
+
+    def connect(self, machines: Machines) -> Interface:
+        """The machines as each of the policies sees them."""
+        return self._policies[0].connect(machines)
 
     def predict(
         self,

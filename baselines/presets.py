@@ -1,7 +1,4 @@
-"""Parameter sets that come with the package, those of users, and the folder for what takes long to make.
-
-The folder may be deleted at any time.
-"""
+"""Parameter sets that come with the package or are a user's YAML files, and the cache folder."""
 
 from __future__ import annotations
 
@@ -15,9 +12,10 @@ from ..envs.settings import from_dict, load, read_yaml
 
 
 def cache_folder() -> Path:
-    """``MOTION_CUEING_CACHE`` of the environment, else ``motion-cueing`` in the user's cache folder.
+    """Folder for results that take long to compute; it may be deleted at any time.
 
-    That is ``XDG_CACHE_HOME``, or ``~/.cache`` without it.
+    It is ``MOTION_CUEING_CACHE`` of the environment, else ``motion-cueing`` in ``XDG_CACHE_HOME`` or in
+    ``~/.cache``.
     """
     chosen = os.environ.get("MOTION_CUEING_CACHE")
     if chosen:

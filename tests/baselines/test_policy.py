@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import textwrap
 from dataclasses import replace
 from functools import partial
 
@@ -11,13 +12,15 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy, TaskPolicy, as_policy, make_policy
+from motion_cueing.baselines import policy as policy_module
 from motion_cueing.baselines.interface import Machines
 from motion_cueing.baselines.policy import NOW, WHOLE_DRIVE, Information, Wrapper
+from motion_cueing.baselines.registry import POLICIES
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ActionError, ConfigurationError
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE, read
+from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE, SLICES, read
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.demonstrations import Demonstrator, demonstrate
@@ -87,6 +90,19 @@ class Heir(Policy):
 
 
 CUES = trace(1.0, weave)
+
+
+def test_the_example_of_the_interface_runs(monkeypatch):
+    # Private, as a registry has no other way to forget a name.
+    monkeypatch.setattr(POLICIES, "_entries", dict(POLICIES._entries))
+    lines = policy_module.__doc__.splitlines()
+    exec(textwrap.dedent("\n".join(line for line in lines if line.startswith("    "))), {})
+    damper = make_policy("damper", PAPER)
+    moving = np.zeros((1, OBSERVATION_SIZE))
+    moving[:, SLICES["carriage_rate"]] = 1.0
+    action, _ = damper.predict(moving)
+    assert action[0, :2] == pytest.approx(-0.5 * read(moving, "carriage_rate")[0])
+    assert rollout(damper, CUES, PAPER).policy == "damper"
 
 
 def test_rollout_takes_an_object_that_has_predict_alone():

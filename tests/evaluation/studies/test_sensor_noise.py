@@ -113,6 +113,14 @@ def test_noise_has_its_size_and_is_on_cues_alone():
         assert not read(seen, name).any()
 
 
+def test_policies_that_know_their_drives_get_the_same_noise_side_by_side():
+    noise = SensorNoise(seed=2)
+    seen, _ = noise_seen(Informed(), noise, n=2, steps=3)
+    bare, _ = noise_seen(Seer(), noise, n=2, steps=3)
+    assert seen.any()
+    np.testing.assert_array_equal(seen, bare)
+
+
 def test_no_noise_is_no_change():
     quiet = SensorNoise(force=0.0, rate=0.0)
     for policy in (ClassicalWashout(), make_policy("learned-preview", PAPER)):
