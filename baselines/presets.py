@@ -1,4 +1,4 @@
-"""Where what takes long to make is kept from one run to the next. The folder may be deleted at any time."""
+"""Parameter sets that come with the package or are a user's YAML files, and the cache folder."""
 
 from __future__ import annotations
 
@@ -12,18 +12,16 @@ from ..envs.settings import from_dict, load, read_yaml
 
 
 def cache_folder() -> Path:
-    """``MOTION_CUEING_CACHE`` of the environment, else ``motion-cueing`` in the user's cache folder.
+    """Folder for results that take long to compute; it may be deleted at any time.
 
-    That is ``XDG_CACHE_HOME``, or ``~/.cache`` without it.
+    It is ``MOTION_CUEING_CACHE`` of the environment, else ``motion-cueing`` in ``XDG_CACHE_HOME`` or in
+    ``~/.cache``.
     """
     chosen = os.environ.get("MOTION_CUEING_CACHE")
     if chosen:
         return Path(chosen)
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "motion-cueing"
-
-
-# Parameter sets that come with the package, a YAML file each, and those of users.
 
 
 T = TypeVar("T")

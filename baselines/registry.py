@@ -1,144 +1,245 @@
-"""Predictive controllers by name and from files; their libraries are imported only when one is made."""
+"""Policies by name and from files: washouts, predictive control, the optimum, and those of other packages.
+
+``register(name, factory, description)`` adds a controller to every command and function that takes a name::
+
+    from motion_cueing.baselines import register
+
+    register("mine", lambda platform: MyController(platform), "one line for lists")
+
+An installed package does the same by an entry point of the group ``motion_cueing.policies``, whose object
+is such a factory. Nothing here imports a controller or Warp before one is made.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import inspect
+import sys
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from ..envs.errors import DataError, UnknownNameError
-from ..envs.platform.machines import Platform
+import yaml
+
+from ..envs.errors import ConfigurationError, DataError
+from ..envs.registry import Registry
 from ..envs.settings import read_yaml
-from .policy import ForeknowingPolicy, NoMotion, Policy
-from .washout import PerManeuverWashout, make_washout
-from .washout.families import FAMILIES, algorithm_of, check_algorithm, family_presets, load_parameters
+from .presets import preset_names
 
-DESCRIPTIONS: Final = {
-    "mpc": "predictive control that knows nothing of the drive ahead",
-    "mpc-preview": "predictive control that sees 2 s of the drive ahead",
-    "mpc-full": "predictive control that knows the drive over its whole horizon, 8 s",
-    "nmpc": "mpc with exact equations, solved until it converges",
-    "nmpc-preview": "mpc-preview with exact equations, solved until it converges",
-}
-"""One line about each by name."""
+if TYPE_CHECKING:
+    from ..envs.platform.machines import Platform
+    from .policy import Policy
+
+Factory: TypeAlias = "Callable[[Platform], Any]"
+"""Makes a policy, or any object that :func:`~.policy.as_policy` takes, for a machine."""
+
+Reader: TypeAlias = "Callable[[Path, Platform], Any]"
+"""Makes a policy from a file, for a machine."""
+
+POLICIES: Final[Registry[Factory]] = Registry(
+    "policy", "motion_cueing.policies", {"classical-ceiling": "classical-per-maneuver"}
+)
+"""Every policy that has a name."""
+
+POLICY_FILES: Final[Registry[Reader]] = Registry("policy file", "motion_cueing.policy_files")
+"""What reads a policy's file, by the ending of its name without the dot."""
 
 PREDICTIVE: Final = ("mpc", "nmpc")
-"""What a file calls them, as its ``algorithm``."""
+"""Algorithms of predictive control, as files name them."""
+
+_DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
 
-def make_predictive(name: str, platform: Platform) -> Policy | ForeknowingPolicy:
-    """The controller of a name of :data:`DESCRIPTIONS` for a machine.
+def register(name: str, factory: Factory | str, description: str = "", *, replace: bool = False) -> None:
+    """Give a policy a name that every command takes.
+
+    Args:
+        name: One word without dots and slashes.
+        factory: Makes the policy for a machine; or ``"module:attribute"``, imported when it is needed.
+        description: One line for lists.
+        replace: Whether a name that is taken is given to the new policy.
 
     Raises:
-        ConfigurationError: a library is missing; the message says how to get it.
+        ConfigurationError: the name is not one word, or is taken.
     """
+    POLICIES.register(name, factory, description, replace=replace)
+
+
+def policy_names() -> list[str]:
+    """Names :func:`make_policy` knows."""
+    return POLICIES.names()
+
+
+def default_policies() -> list[str]:
+    """Policies an evaluation compares where none is named."""
+    return list(_DEFAULT)
+
+
+def describe_policy(name: str) -> str:
+    """One line about a policy.
+
+    Raises:
+        UnknownNameError: no policy has this name.
+    """
+    return POLICIES.description(name)
+
+
+def make_policy(name: Any, platform: Platform, *, force: bool = False) -> Policy:
+    """A policy for a machine, by name or from a file; or a policy itself, fitted to the machine.
+
+    Args:
+        name: Of a registered policy; a file, such as the YAML of a washout or a predictive controller, and
+            whatever else :data:`POLICY_FILES` reads; a class or function of one's own as ``module:Class`` or
+            ``file.py:Class``; or any object that :func:`~.policy.as_policy` takes.
+        platform: The machine.
+        force: Whether a policy that was made for another machine is put on this one as well as it can be.
+
+    Raises:
+        UnknownNameError: no policy has this name.
+        DataError: the file does not exist or cannot be read.
+        ConfigurationError: a field of the file is wrong, an object has no ``predict``, or the policy was made
+            for another machine.
+    """
+    from .policy import as_policy
+
+    policy = as_policy(_made(name, platform))
+    return policy.on(platform) if force else policy.for_platform(platform)
+
+
+def _made(name: Any, platform: Platform) -> Any:
+    """What a name or file stands for; anything else is returned."""
+    if not isinstance(name, str | Path):
+        return name
+    text, ending = str(name), Path(name).suffix.removeprefix(".")
+    if text not in POLICIES:
+        if is_reference(text):
+            return _referenced(text, platform)
+        if ending in POLICY_FILES:
+            return POLICY_FILES[ending](Path(name), platform)
+        if Path(name).exists():
+            known = ", ".join(f".{one}" for one in POLICY_FILES)
+            raise DataError(f"{name}: not a policy; the name of a policy's file ends in one of {known}")
+    return POLICIES[text](platform)
+
+
+def is_reference(name: str) -> bool:
+    """Whether a name means an object of the user's: ``module:Class`` or ``file.py:Class``."""
+    return ":" in name
+
+
+def _referenced(name: str, platform: Platform) -> Any:
+    """An object of the user's; a class or function is called to make it.
+
+    It is called with the machine if its first argument is called ``platform``, else without arguments.
+
+    Raises:
+        ConfigurationError: it cannot be imported or made.
+    """
+    module, _, attribute = name.rpartition(":")
+    try:
+        target = getattr(_import(module), attribute)
+        if inspect.isclass(target) or inspect.isroutine(target):
+            first = next(iter(inspect.signature(target).parameters), None)
+            target = target(platform) if first == "platform" else target()
+    except Exception as error:  # It is a user's code.
+        raise ConfigurationError(f"policy {name}: {type(error).__name__}: {error}") from error
+    return target
+
+
+def _import(module: str) -> Any:
+    """A module by name or file."""
+    if not module.endswith(".py"):
+        return import_module(module)
+    if not Path(module).exists():
+        raise FileNotFoundError(f"{module}: there is no such file")
+    spec = spec_from_file_location(Path(module).stem, module)
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = module_from_spec(spec)
+    # Dataclasses and pickles look for the module of their class.
+    sys.modules.setdefault(spec.name, loaded)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+# The policies of this package. Factories import what they need.
+
+
+def _no_motion(platform: Platform) -> Policy:
+    from .policy import NoMotion
+
+    return NoMotion()
+
+
+def _per_maneuver(platform: Platform) -> Policy:
+    from .washout.classical import PerManeuverWashout
+
+    return PerManeuverWashout(platform)
+
+
+def _washout(name: str, platform: Platform) -> Policy:
+    from .washout import load_parameters, make_washout
+
+    return make_washout(load_parameters(name), platform.cab)
+
+
+def _mpc(name: str, platform: Platform) -> Policy:
     from .mpc import load_mpc, make_mpc
 
     return make_mpc(platform, load_mpc(name), name)
 
 
-def predictive_from_file(path: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
-    """The controller with the parameters of a file.
+def _optimum(objective: Any, platform: Platform) -> Policy:
+    from .optimum import Optimum, OptimumOptions
 
-    Args:
-        path: Of the file, whose ``algorithm`` is one of :data:`PREDICTIVE`.
-        platform: The machine.
+    return Optimum(platform, OptimumOptions(objective=objective), progress=False)
 
-    Raises:
-        ConfigurationError: a field is wrong, or a library is missing.
-    """
+
+def _from_yaml(path: Path, platform: Platform) -> Policy:
+    from .washout import FAMILIES, load_parameters, make_washout
+    from .washout.families import algorithm_of, check_algorithm
+
+    algorithm = check_algorithm(algorithm_of(read_yaml(path)), path, (*FAMILIES, *PREDICTIVE))
+    if algorithm not in PREDICTIVE:
+        return make_washout(load_parameters(path), platform.cab)
     from .mpc import load_mpc, make_mpc
 
-    return make_mpc(platform, load_mpc(path), Path(path).stem)
+    return make_mpc(platform, load_mpc(path), path.stem)
 
 
-# Policies by name or file.
+def _description(path: Path) -> str:
+    """The description in a preset's file, whose first lines hold it."""
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return str(yaml.safe_load("\n".join(lines[:3])).get("description", ""))
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A policy that goes by a name.
-
-    Args:
-        description: One line.
-        make: The policy for a machine; libraries that only it needs are imported here.
-    """
-
-    description: str
-    make: Callable[[Platform], Policy | ForeknowingPolicy]
-
-
-def _predictive(name: str) -> Callable[[Platform], Policy | ForeknowingPolicy]:
-    return lambda platform: make_predictive(name, platform)
-
-
-def _optimum(objective: Literal["J", "perceived"]) -> Callable[[Platform], Policy | ForeknowingPolicy]:
-    def make(platform: Platform) -> Policy | ForeknowingPolicy:
-        from .optimum import Optimum, OptimumOptions
-
-        return Optimum(platform, OptimumOptions(objective=objective), progress=False)
-
-    return make
-
-
-_ENTRIES: Final[Mapping[str, Entry]] = {
-    NoMotion.name: Entry("the machine stands still", lambda platform: NoMotion()),
-    PerManeuverWashout.name: Entry(
-        "an oracle: classical with the best set for each standard maneuver", PerManeuverWashout
-    ),
-    **{name: Entry(told, _predictive(name)) for name, told in DESCRIPTIONS.items()},
-    "optimum": Entry("the least J there is: the whole drive known, its motion planned", _optimum("J")),
-    "optimum-perceived": Entry("the same for the least perceived J", _optimum("perceived")),
-}
-"""Policies by name, beside the presets of the washouts."""
-
-_RENAMED: Final = {"classical-ceiling": PerManeuverWashout.name}
-
-_DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
+def _register_own() -> None:
+    register("no-motion", _no_motion, "the machine stands still")
+    register(
+        "classical-per-maneuver",
+        _per_maneuver,
+        "an oracle: classical with the best set for each standard maneuver",
+    )
+    for name, about in {
+        "mpc": "predictive control that knows nothing of the drive ahead",
+        "mpc-preview": "predictive control that sees 2 s of the drive ahead",
+        "mpc-full": "predictive control that knows the drive over its whole horizon, 8 s",
+        "nmpc": "mpc with exact equations, solved until it converges",
+        "nmpc-preview": "mpc-preview with exact equations, solved until it converges",
+    }.items():
+        register(name, partial(_mpc, name), about)
+    register(
+        "optimum", partial(_optimum, "J"), "the least J there is: the whole drive known, its motion planned"
+    )
+    register("optimum-perceived", partial(_optimum, "perceived"), "the same for the least perceived J")
+    for family in ("classical", "adaptive", "optimal"):
+        folder = Path(__file__).parent / "washout" / family / "presets"
+        for name in preset_names(folder):
+            register(name, partial(_washout, name), _description(folder / f"{name}.yaml"))
+    for ending in ("yaml", "yml"):
+        POLICY_FILES.register(ending, _from_yaml, "a washout or a predictive controller")
 
 
-def policy_names() -> list[str]:
-    """Names :func:`make_policy` knows."""
-    return [*_ENTRIES, *family_presets()]
-
-
-def default_policies() -> list[str]:
-    """Policies an evaluation compares unless told otherwise."""
-    return list(_DEFAULT)
-
-
-def describe_policy(name: str) -> str:
-    """One line about a policy."""
-    if name in _ENTRIES:
-        return _ENTRIES[name].description
-    return str(load_parameters(name).description)
-
-
-def make_policy(name: str | Path, platform: Platform) -> Policy | ForeknowingPolicy:
-    """A policy for a machine, by name or from the YAML file of a washout or a predictive controller.
-
-    Raises:
-        UnknownNameError: no policy has this name.
-        DataError: the file does not exist or cannot be read.
-        ConfigurationError: a field of the file is wrong.
-    """
-    if str(name) in _ENTRIES:
-        return _ENTRIES[str(name)].make(platform)
-    if Path(name).suffix in (".yaml", ".yml"):
-        return _from_file(Path(name), platform)
-    if str(name) in family_presets():
-        return make_washout(load_parameters(str(name)), platform.cab)
-    if Path(name).exists():
-        raise DataError(
-            f"{name}: not a policy; expected the .yaml file of a washout or a predictive controller"
-        )
-    raise UnknownNameError("policy", str(name), policy_names(), _RENAMED)
-
-
-def _from_file(path: Path, platform: Platform) -> Policy | ForeknowingPolicy:
-    values = read_yaml(path)
-    algorithm = check_algorithm(algorithm_of(values), path, (*FAMILIES, *PREDICTIVE))
-    if isinstance(values, dict) and algorithm in PREDICTIVE:
-        return predictive_from_file(path, platform)
-    return make_washout(load_parameters(path), platform.cab)
+_register_own()

@@ -28,9 +28,9 @@ from rich.table import Table
 
 from benchmarks.predictive import MANEUVERS, steps
 from benchmarks.report import machine, yes
+from motion_cueing.baselines.policy import Wrapper
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.evaluation import rollout
-from motion_cueing.evaluation.rollout import Wrapped
 from motion_cueing.train.agents import Agent, agent_names, get_agent
 from motion_cueing.train.agents.export import INPUT, OUTPUT, export_onnx
 
@@ -44,17 +44,16 @@ Answer = Callable[[np.ndarray], Any]
 """An agent's to an observation (1, size)."""
 
 
-class Watched(Wrapped):
+class Watched(Wrapper):
     """An agent that remembers what it saw."""
 
     def __init__(self, agent: Agent) -> None:
         super().__init__(agent)
-        self.task, self.base_policy, self.seen = agent.task, agent.base_policy, []
-        self._agent = agent
+        self.seen: list[np.ndarray] = []
 
     def predict(self, observation: np.ndarray, *arguments: Any, **options: Any) -> Any:
         self.seen.append(np.array(observation, dtype=np.float32).reshape(1, -1))
-        return self._agent.predict(observation, *arguments, **options)
+        return self.inner.predict(observation, *arguments, **options)
 
 
 def seen_by(agent: Agent) -> list[np.ndarray]:

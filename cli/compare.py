@@ -51,8 +51,9 @@ def run(command: CompareCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
+    from ..evaluation.policies import make_policy
     from ..evaluation.studies.figures import lines_figure
-    from ..evaluation.studies.study import Condition, policy_on
+    from ..evaluation.studies.study import Condition
 
     machines = find_machines(command)
     car = find_car(command.car)
@@ -60,7 +61,14 @@ def run(command: CompareCommand) -> int:
     policies = find_policies(command.policies, next(iter(machines.values())))
     prepare(command.out, command.fresh)
     conditions = [
-        Condition(name, machine.description, machine, car, maneuvers, partial(policy_on, platform=machine))
+        Condition(
+            name,
+            machine.description,
+            machine,
+            car,
+            maneuvers,
+            partial(make_policy, platform=machine, force=True),
+        )
         for name, machine in machines.items()
     ]
     return run_and_save(

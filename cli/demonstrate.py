@@ -18,7 +18,7 @@ from ..envs.storage import check_folder
 from ..evaluation.demonstrations import Demonstrator, demonstrate
 from ..evaluation.metrics import measure
 from ..evaluation.reporting.text import number
-from ..evaluation.rollout import notes_of
+from ..evaluation.rollout import statistics_of
 from ..evaluation.selection import find_car, find_maneuvers, find_platform
 from ..evaluation.suite import CueSource, suite_progress
 from ..train.algorithms.dagger.demonstrations import INDEX, DriveEntry, Index, is_kept, load_index, save_drive
@@ -174,7 +174,7 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
         cue_error=found.cue_error,
         perceived_cue_error=found.perceived_cue_error,
         at_limit=found.at_limit,
-        notes=notes_of(record.metadata),
+        notes=statistics_of(record.metadata),
     )
 
 

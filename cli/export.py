@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from ..envs.errors import ConfigurationError
 from ..envs.storage import check_file
-from ..evaluation.policies import find_agent
+from ..train.agents import find_agent
 
 
 @dataclass(frozen=True)

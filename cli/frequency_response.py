@@ -21,9 +21,9 @@ from ..evaluation.selection import find_platform, find_policies
 from ..evaluation.suite import explain, suite_progress
 
 if TYPE_CHECKING:
+    from ..baselines.policy import Policy
     from ..envs.platform import Platform
     from ..evaluation.frequency_response.response import FrequencyResponse
-    from ..evaluation.rollout import AnyPolicy
 
 _SMALL: Final = 1e-6
 """Scale below which amplitudes drown in rounding."""
@@ -129,13 +129,13 @@ def measure_all(command: FrequencyResponseCommand) -> Measured:
 
 def _line_up(
     command: FrequencyResponseCommand, platform: Platform
-) -> tuple[dict[str, AnyPolicy], dict[str, str]]:
-    """Policies by label, and the reasons of those of the benchmark that are left out.
+) -> tuple[dict[str, Policy], dict[str, str]]:
+    """Policies by label, and the reasons of those of the benchmark that are skipped.
 
     Raises:
         MotionCueingError: a policy that is asked for by its name cannot be made or tested.
     """
-    policies: dict[str, AnyPolicy] = {}
+    policies: dict[str, Policy] = {}
     left_out: dict[str, str] = {}
     for label, name in find_policies(command.policy, platform).items():
         try:
@@ -147,12 +147,11 @@ def _line_up(
     return policies, left_out
 
 
-def _testable(name: str, platform: Platform) -> AnyPolicy:
-    from ..baselines.washout import PerManeuverWashout
+def _testable(name: str, platform: Platform) -> Policy:
     from ..evaluation.policies import make_policy
 
     policy = make_policy(name, platform)
-    if isinstance(policy, PerManeuverWashout):
+    if name == "classical-per-maneuver":
         raise ConfigurationError(
             f"{name} has a set for each standard maneuver and none for sinusoids, so it has no frequency "
             "response; use classical-tuned, or the .yaml file of one set"

@@ -36,7 +36,7 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
     from ..envs.car import car_names, get_car
     from ..envs.maneuvers import get_maneuver, get_recording, maneuver_names, recording_names
     from ..envs.platform import ablation_names, get_platform, platform_names
-    from ..evaluation.policies import describe_policy, policy_names
+    from ..train.agents import describe_policy, policy_names
 
     return [
         ("Policies", [(name, describe_policy(name)) for name in policy_names()]),

@@ -97,9 +97,9 @@ def results_of(
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),
         summaries=summarize(outcome.metrics, criteria),
-        skipped=outcome.left_out,
+        skipped=outcome.skipped,
         failures=tuple(outcome.failures),
         metrics=outcome.metrics,
-        notes=outcome.notes,
+        notes=outcome.statistics,
         criteria=criteria,
     )

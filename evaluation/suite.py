@@ -18,7 +18,7 @@ from ..envs.errors import ConfigurationError, MotionCueingError
 from .metrics import Criteria, Metrics, measure
 from .reporting.text import how_many
 from .results import Failure
-from .rollout import notes_of
+from .rollout import statistics_of
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ Drive = Callable[[CueTrace], Trajectory]
 Finish = Callable[[str, Mapping[str, Trajectory]], None]
 """Receives the trajectories of a maneuver by policy before they are dropped."""
 OnDrive = Callable[[str, str], None]
-"""Told the maneuver and the policy before each drive."""
+"""Called with the maneuver and the policy before each drive."""
 
 SETUP: Final = "cues"
 """Given to :data:`OnDrive` in place of a policy while the car drives the maneuver."""
@@ -66,7 +66,7 @@ SETUP: Final = "cues"
 
 @dataclass(eq=False)
 class Outcome:
-    """What a suite found so far.
+    """The results of a suite so far.
 
     Args:
         maneuvers: Metrics by maneuver and policy, in the order they were run.
@@ -113,8 +113,8 @@ def run_suite(
         drives = {name: drives[name] for name in measured}
         for name, drive in drives.items():
             outcome.metadata.setdefault(name, dict(drive.metadata))
-            if notes_of(drive.metadata):
-                outcome.notes.setdefault(maneuver, {})[name] = notes_of(drive.metadata)
+            if statistics_of(drive.metadata):
+                outcome.notes.setdefault(maneuver, {})[name] = statistics_of(drive.metadata)
         if drives:
             try:
                 finish(maneuver, drives)
@@ -159,25 +159,22 @@ def explain(error: Exception) -> str:
 
 
 def labels(names: Sequence[str], stems: Sequence[str], reserved: Collection[str] = ()) -> dict[str, str]:
-    """A label for each of the names asked for: its stem, numbered where two stems are equal.
+    """A label for each name: its stem, numbered where two stems are equal.
 
     Args:
         names: As the user wrote them; repeated ones count once.
         stems: A short label for each.
         reserved: Labels that only a name that is the same may have: a file is no shipped policy.
     """
-    found: dict[str, str] = {}
+    given: dict[str, str] = {}
     for name, stem in zip(names, stems, strict=True):
-        if name in found:
+        if name in given:
             continue
         label, number = stem, 2
-        while label in found.values() or (label in reserved and label != name):
+        while label in given.values() or (label in reserved and label != name):
             label, number = f"{stem}-{number}", number + 1
-        found[name] = label
-    return found
-
-
-# What went wrong in solves, as controllers count it in their notes: one line a policy.
+        given[name] = label
+    return given
 
 
 _TROUBLES: Final = {
@@ -198,39 +195,38 @@ Notes = Mapping[str, Mapping[str, str]]
 
 
 def trouble_lines(notes: Iterable[tuple[str, str, Mapping[str, str]]]) -> dict[str, str]:
-    """What each policy counted that should not be, in words; policies with nothing of the kind are missing.
+    """Solves that went wrong, in one line a policy; policies without any are missing.
 
     Args:
         notes: Policy, drive and what the policy counted there.
     """
-    drives: dict[str, dict[str, Mapping[str, str]]] = {}
+    by_policy: dict[str, dict[str, Mapping[str, str]]] = {}
     for policy, drive, counted in notes:
-        drives.setdefault(policy, {})[drive] = counted
-    told = {policy: _told(found) for policy, found in drives.items()}
-    return {policy: line for policy, line in told.items() if line}
-
-
-def _told(drives: Notes) -> str:
-    return "; ".join(text for trouble in _TROUBLES if (text := _trouble(trouble, drives)))
+        by_policy.setdefault(policy, {})[drive] = counted
+    lines = {
+        policy: "; ".join(text for trouble in _TROUBLES if (text := _trouble(trouble, drives)))
+        for policy, drives in by_policy.items()
+    }
+    return {policy: line for policy, line in lines.items() if line}
 
 
 def _trouble(trouble: str, drives: Notes) -> str:
     """One kind of trouble: how many of how many, and in which drives, most first."""
     whole, noun = _WHOLES[trouble.partition("_")[0]]
-    found = {name: _number(counted, trouble) for name, counted in drives.items()}
-    found = {name: count for name, count in found.items() if count > 0}
-    if not found:
+    counts = {name: _number(counted, trouble) for name, counted in drives.items()}
+    counts = {name: count for name, count in counts.items() if count > 0}
+    if not counts:
         return ""
     totals = {name: _number(counted, whole) for name, counted in drives.items()}
-    order = sorted(found, key=lambda name: -found[name])
-    named = ", ".join(f"{name} {found[name]} of {totals[name]}" for name in order[:_MOST])
+    order = sorted(counts, key=lambda name: -counts[name])
+    named = ", ".join(f"{name} {counts[name]} of {totals[name]}" for name in order[:_MOST])
     more = f", and {how_many(len(order) - _MOST, 'more drive')}" if len(order) > _MOST else ""
     total = how_many(sum(totals.values()), noun)
-    return f"{sum(found.values())} of {total} {_TROUBLES[trouble]} ({named}{more})"
+    return f"{sum(counts.values())} of {total} {_TROUBLES[trouble]} ({named}{more})"
 
 
 def _number(counted: Mapping[str, str], name: str) -> int:
-    """A count; 0 where a policy of somebody else's notes something that is none."""
+    """A count; 0 where a user's policy has something else under this name."""
     text = counted.get(name, "0")
     return int(text) if text.isdecimal() else 0
 
@@ -239,9 +235,6 @@ def print_troubles(console: Console, notes: Iterable[tuple[str, str, Mapping[str
     """Show :func:`trouble_lines`."""
     for policy, line in trouble_lines(notes).items():
         console.print(f"[bold]counted[/bold] {escape(policy)}: {escape(line)}", highlight=False)
-
-
-# Drives that were driven already, such as those of `motion-cueing serve`, in an evaluation.
 
 
 DRIVEN: Final = "driven"

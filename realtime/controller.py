@@ -9,20 +9,21 @@ Policies act every 10 ms, as in an evaluation. Set-points within such a time ste
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..baselines.interface import Interface, MachineInterface, Machines
+from ..baselines.policy import Policy, Wrapper, as_policy
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.settings import configuration
-from ..envs.simulator.simulator import TIME_STEP, Simulator
-from ..evaluation.rollout import Sample, record, trajectory_of
+from ..envs.simulator.simulator import TIME_STEP
+from ..evaluation.rollout import Rollout, record, trajectory_of
 from ..evaluation.suite import explain
 from ..evaluation.trajectory import Trajectory
 from .inbox import Inbox
@@ -79,35 +80,51 @@ class LoopLog:
             platform: The machine.
             start: (9,) pose it began at.
             vestibular: Perception model by name.
-            policy: For its name, its parameters and its notes.
+            policy: For its name, its parameters and its statistics.
         """
-        replay = _Replay(self.rows, platform, vestibular)
-        trajectory = trajectory_of(record(replay, start), replay, policy, replay.simulator.drives[0], None)
-        states = self.states
-        steps = {f"loop_{state.name.lower()}": str(int((states == state).sum())) for state in State}
-        return replace(trajectory, metadata={**trajectory.metadata, **steps})
-
-
-class _Replay:
-    """Rollout of the logged accelerations."""
-
-    def __init__(self, rows: NDArray[Any], platform: Platform, vestibular: str) -> None:
-        self._rows = rows
+        rows, states = self.rows, self.states
         force, rate = rows["cues"][:, :3], rows["cues"][:, 3:]
         # The controller had the angular acceleration of the step before.
         change = np.diff(rate, axis=0, prepend=rate[:1]) / TIME_STEP
         time = np.asarray(TIME_STEP * np.arange(len(rows)), dtype=np.float64)
         cues = CueTrace("loop", time, force, rate, change, source="in the loop")
-        self.simulator = Simulator(platform, cues, vestibular=get_vestibular_model(vestibular), dt=TIME_STEP)
+        machines = Machines([cues], [platform], None, get_vestibular_model(vestibular))
+        run = Rollout(_Replay(as_policy(policy), rows["action"]), machines, start)
+        steps = {f"loop_{state.name.lower()}": str(int((states == state).sum())) for state in State}
+        trajectory = trajectory_of(record(run), run)
+        return replace(
+            trajectory,
+            step_time=np.append(math.nan, rows["seconds"][:-1]),
+            metadata={**trajectory.metadata, **steps},
+        )
 
-    def begin(self, start: ArrayLike) -> NDArray[Any]:
-        """Put the machine at rest at a pose (9,); returns its state."""
-        return self.simulator.reset(start)[0]  # type: ignore[no-any-return]
 
-    def samples(self) -> Iterator[Sample]:
-        """One time step after another."""
-        for row in self._rows:
-            yield Sample(row["action"], self.simulator.step(row["action"])[0], row["seconds"])
+class _Replay(Wrapper):
+    """The logged accelerations again, in the name of the policy.
+
+    Args:
+        policy: The policy.
+        actions: (n, 9) accelerations of each time step.
+    """
+
+    def __init__(self, policy: Policy, actions: Floats) -> None:
+        super().__init__(policy)
+        self.task, self.time_step, self._actions = None, TIME_STEP, actions
+
+    def connect(self, machines: Machines) -> Interface:
+        """The interface of accelerations, whatever the policy sees."""
+        return MachineInterface(machines)
+
+    def predict(
+        self,
+        observation: NDArray[Any],
+        state: Any = None,
+        episode_start: NDArray[Any] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[Any], int]:
+        """The accelerations of the next time step; the state is the number of steps done."""
+        step = 0 if state is None else int(state)
+        return self._actions[step : step + 1], step + 1
 
 
 @configuration

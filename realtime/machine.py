@@ -1,15 +1,16 @@
-"""Cues that come while the machine moves, where its kernels look for those of a drive."""
+"""A policy on its machine in real time: live cues, steps of 10 ms, and set-points between them."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..baselines.policy import ForeknowingPolicy, Policy, start_of
+from ..baselines.interface import Machines
+from ..baselines.policy import Policy, as_policy
 from ..envs.arrays import Mirror
 from ..envs.cues import GRAVITY, CueTrace
 from ..envs.errors import ActionError, ConfigurationError
@@ -18,8 +19,7 @@ from ..envs.platform import Platform
 from ..envs.platform.kernels.step import CARRIAGE, LEGS, TURNTABLE
 from ..envs.simulator.kernels.observation import SCALES
 from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
-from ..envs.task.batch import Batch
-from ..evaluation.rollout import Asked, Observer, TaskPolicy, deterministic, on_machine
+from ..evaluation.rollout import Actor
 from ..evaluation.suite import explain
 from .packets import MOTION, MOTION_SIZE
 
@@ -68,7 +68,7 @@ class LiveCues:
 
     @property
     def reference_cue(self) -> Floats:
-        """(6,) cues wanted now."""
+        """(6,) cues of the car now."""
         return np.concatenate([self._rows[0][NOW], self._rows[1][NOW]])
 
     def put(self, cues: Floats) -> None:
@@ -89,65 +89,12 @@ class LiveCues:
         self._remember()
 
     def _scaled(self) -> Floats:
-        """(6,) cues wanted now, as an observation scales them."""
+        """(6,) cues of the car now, as an observation scales them."""
         return np.asarray((self.reference_cue - AT_REST) / _SCALE)
 
     def _remember(self) -> None:
         if self._memory is not None:
             self._memory[NOW] = self._past.ravel()
-
-
-# One batch brought to where another one is, fast: its arrays are copied as bytes.
-
-
-Bytes = NDArray[np.uint8]
-
-
-class Twin:
-    """A batch on the CPU that follows another one made alike.
-
-    Batches have snapshots for this; in real time those take too long.
-
-    Args:
-        leader: Where it is brought to.
-        follower: That is brought there.
-    """
-
-    def __init__(self, leader: Batch, follower: Batch) -> None:
-        self._leader, self._follower = leader, follower
-        arrays = zip(vars(leader.arrays).values(), vars(follower.arrays).values(), strict=True)
-        self._arrays = [(_bytes_of(a.view), _bytes_of(b.view)) for a, b in arrays]
-        self._states = [_states_of(batch) for batch in (leader, follower)]
-
-    def follow(self) -> None:
-        """Bring the follower to where the leader is."""
-        for source, target in self._arrays:
-            target[...] = source
-        leader, follower = self._leader, self._follower
-        sources, targets = self._states
-        pairs = zip(sources[leader.simulator.current], targets[follower.simulator.current], strict=True)
-        for source, target in pairs:
-            target[...] = source
-        follower.base.restore(leader.base.snapshot())
-
-
-def _states_of(batch: Batch) -> list[tuple[Bytes, ...]]:
-    """Bytes of state and earlier set-points, for both copies that hold in turn."""
-    return [tuple(_bytes_of(array.numpy()) for array in pair) for pair in batch.simulator.copies]
-
-
-def _bytes_of(array: Any) -> Bytes:
-    """The memory of an array, flat; no copy."""
-    return np.asarray(array).reshape(-1).view(np.uint8)
-
-
-# Set-points between two time steps of the machine, at a higher rate.
-#
-# Within a step an actuator moves with constant acceleration. Velocity goes in a straight line from one
-# step to
-# the next, acceleration is its slope, and position follows Hermite's cubic, which is the parabola
-# itself where
-# the motion is that of constant acceleration. So velocities and accelerations keep the limits the steps keep.
 
 
 AXES_AND_LEGS: Final = 15
@@ -184,6 +131,10 @@ def _parts_of(motion: Any) -> tuple[list[Floats], list[Floats]]:
 class Track:
     """Set-points of one time step, for the end of each of its periods.
 
+    Within a step an actuator moves with constant acceleration. Velocity goes in a straight line from one step
+    to the next, acceleration is its slope, and position follows Hermite's cubic, which is the parabola itself
+    where acceleration is constant. So velocities and accelerations keep the limits that the steps keep.
+
     Args:
         periods: In a time step.
         dt: Time step, s.
@@ -210,67 +161,84 @@ class Track:
         return out
 
 
-# A policy with its machine in real time: the machine up to now, and the same one step ahead.
-#
-# A rollout knows the cues at the end of a step when it takes it; here they are still to come. So each step is
-# taken twice: at its begin by the machine ahead, whose motion is sent (it does not depend on the cues
-# wanted),
-# and at its end by the machine now, with the cues that have come since: this one the policy sees. Both
-# take the
-# very steps of a rollout.
-
-
 _WARMING: Final = 4
 """Steps that meet both copies of every state."""
 
 
-class LiveMachine(ABC):
-    """One machine that moves while its cues come.
+class LiveMachine:
+    """One machine that moves while its cues come, and the policy that moves it.
+
+    A rollout knows the cues at the end of a step when it takes it; here they are still to come. So each step
+    is taken twice. At its begin the machine ahead takes it, whose motion is sent: motion does not depend on
+    the reference cue. At its end the machine now takes it, with the cues that have come since: this one the
+    policy sees. Both take the very steps of a rollout.
 
     Args:
-        now: Where it is, with the live drive of ``cues``.
-        ahead: The same a time step later.
-        cues: Of ``now``.
-        start: (9,) pose to begin at.
+        policy: The policy, made for the machine.
+        platform: The machine.
+        vestibular: Perception model.
 
     Attributes:
+        now: Where the machine is, with the live drive.
+        ahead: The same a time step later.
         ahead_steps: Time steps that the policy looks ahead.
-        motion: (2, 15) set-point of the machine ahead, see :class:`~.track.MotionView`.
+        start: (9,) pose to begin at.
+        motion: (2, 15) set-point of the machine ahead, see :class:`MotionView`.
     """
 
-    ahead_steps = 0
-
-    def __init__(self, now: Simulator, ahead: Simulator, cues: LiveCues, start: ArrayLike) -> None:
-        self.now, self.ahead, self._cues = now, ahead, cues
-        self._view = MotionView(ahead)
-        self.start = np.asarray(start, dtype=np.float64)
-        self._last: Floats | None = None
+    def __init__(self, policy: Policy, platform: Platform, vestibular: VestibularModel) -> None:
+        self._policy = policy
+        self.ahead_steps = round(policy.information.seconds / TIME_STEP)
+        # A base policy has a memory: each interface gets one of its own.
+        self._now, self._ahead = (
+            policy.connect(Machines([standing(self.ahead_steps)], [platform], None, vestibular))
+            for _ in range(2)
+        )
+        self.now, self.ahead = self._now.simulator, self._ahead.simulator
+        self._follow = self._ahead.follow(self._now)
+        self._cues = LiveCues(self.now, *self._now.cue_memory)
+        self._view = MotionView(self.ahead)
+        self.start = np.asarray(policy.start_pose, dtype=np.float64)
         self.reset()
+        self.begin()
 
     def reset(self) -> None:
         """Put the machine at rest at its start pose."""
         for simulator in (self.now, self.ahead):
             simulator.reset(self.start)
-        self._last = None
+        self._last: Floats | None = None
         self.motion = self._view()
+
+    def begin(self) -> None:
+        """The policy begins anew, from where the machine is."""
+        self._cues.begin()
+        self._now.begin(None)
+        self._actor = Actor(self._policy, 1, self._now.action_size)
+        self._let_go()
 
     @property
     def reference_cue(self) -> Floats:
-        """(6,) cues wanted now: specific force, m/s^2, and angular velocity, rad/s."""
+        """(6,) cues of the car now: specific force, m/s^2, and angular velocity, rad/s."""
         return self._cues.reference_cue
 
     def catch_up(self, cues: Floats) -> None:
-        """Take the machine to where it was a step ahead, with the cues (6,) that are wanted there.
+        """Take the machine to where it was a step ahead, with the car's cues (6,) there.
 
         Raises:
-            Exception: whatever the policy's own code does; the machine is there all the same.
+            Exception: any error of the policy's own code; the machine is there all the same.
         """
         self._cues.put(cues)
         if self._last is None:
             self.now.reset(self.start, sample=NOW)
             return
         try:
-            self._follow(self._last)
+            if self._actions is None:
+                self.now.step(self._last)
+            else:
+                next(self._actions[0])
+                if self._left == 0:
+                    # The end of the action makes the observation whole.
+                    next(self._actions[0], None)
         except Exception:
             self.now.restore(self.ahead.snapshot())
             raise
@@ -279,16 +247,16 @@ class LiveMachine(ABC):
         """Let the policy act; returns the (9,) accelerations it asks for, and the seconds it took.
 
         Raises:
-            Exception: whatever the policy's own code does, or an ActionError; nothing has moved then.
+            Exception: any error of the policy's own code, or an ActionError; nothing has moved then.
         """
         try:
-            asked, seconds = self._lead()
+            seconds = self._lead()
             self._arrive()
         except Exception:
             self.ahead.restore(self.now.snapshot())
             raise
-        self._last = asked
-        return asked, seconds
+        self._last = self._ahead.requested[0]
+        return self._last, seconds
 
     def move(self, accelerations: Floats) -> None:
         """Take the next step with (9,) accelerations of ours instead of the policy's."""
@@ -297,21 +265,23 @@ class LiveMachine(ABC):
         self._arrive()
         self._last = accelerations
 
-    @abstractmethod
-    def begin(self) -> None:
-        """The policy begins anew, from where the machine is."""
-
-    @abstractmethod
-    def _follow(self, accelerations: Floats) -> None:
-        """Take the machine now through the last step of the machine ahead."""
-
-    @abstractmethod
-    def _lead(self) -> tuple[Floats, float]:
-        """Ask the policy, and take the machine ahead through the next step."""
-
     def _let_go(self) -> None:
-        """Forget what the policy had begun."""
-        return
+        """Forget the action that the policy had begun."""
+        self._actions: tuple[Iterator[None], Iterator[None]] | None = None
+        self._left = 0
+
+    def _lead(self) -> float:
+        """Ask the policy if its last action is over, and take the machine ahead through the next step."""
+        seconds, actions = math.nan, self._actions
+        if actions is None or self._left == 0:
+            action, seconds = self._actor(self._now.observe())
+            actions = self._now.act(action), self._ahead.act(action)
+            self._actions, self._left = actions, self._now.steps_per_action
+        # The base policy, if there is one, must see the cues that have come since.
+        self._follow()
+        next(actions[1])
+        self._left -= 1
+        return seconds
 
     def _arrive(self) -> None:
         motion = self._view()
@@ -320,120 +290,36 @@ class LiveMachine(ABC):
         self.motion = motion
 
 
-class FreeMachine(LiveMachine):
-    """For a policy that sees the machine and asks for accelerations."""
+def make_machine(policy: Any, platform: Platform, vestibular: str = "zacharias") -> LiveMachine:
+    """A policy on its machine, warmed up: kernels are compiled, and the policy has acted once.
 
-    def __init__(self, policy: Policy, platform: Platform, vestibular: VestibularModel) -> None:
-        now, ahead = (Simulator(platform, standing(0), vestibular=vestibular) for _ in range(2))
-        self._policy = policy
-        self._observe = Observer(now)
-        super().__init__(now, ahead, LiveCues(now), start_of(policy))
-        self.begin()
-
-    def begin(self) -> None:
-        """The policy begins anew, from where the machine is."""
-        self._ask = Asked(self._policy, N_AXES)
-
-    def _follow(self, accelerations: Floats) -> None:
-        self.now.step(accelerations)
-
-    def _lead(self) -> tuple[Floats, float]:
-        action, seconds = self._ask(self._observe())
-        self.ahead.step(action)
-        return action, seconds
-
-
-class TaskMachine(LiveMachine):
-    """For a policy that sees an environment and acts in it."""
-
-    def __init__(self, policy: TaskPolicy, platform: Platform, vestibular: VestibularModel) -> None:
-        policy = on_machine(policy, platform)
-        task = deterministic(policy.task, vestibular)
-        stride = max(1, round(task.observation.preview_spacing / TIME_STEP))
-        self.ahead_steps = task.observation.preview * stride
-        self._policy = policy
-        # A base policy has a memory: each environment gets one of its own.
-        self._now, self._ahead = (
-            Batch(1, task, drives=[standing(self.ahead_steps)], base=getattr(policy, "base_policy", None))
-            for _ in range(2)
-        )
-        self._twin = Twin(self._now, self._ahead)
-        cues = LiveCues(self._now.simulator, self._now.arrays.memory, task.observation.memory)
-        super().__init__(self._now.simulator, self._ahead.simulator, cues, start_of(policy))
-        self.begin()
-
-    def begin(self) -> None:
-        """The policy begins anew, from where the machine is."""
-        everything = np.ones(1, dtype=bool)
-        where = self.now.snapshot()
-        self._now.begin(everything)
-        self.now.restore(where)
-        self._cues.begin()
-        self._now.observe(everything)
-        self._ask = Asked(self._policy, self._now.action_size)
-        self._let_go()
-
-    def _let_go(self) -> None:
-        self._plays: tuple[Iterator[int], Iterator[int]] | None = None
-        self._left = 0
-
-    def _follow(self, accelerations: Floats) -> None:
-        if self._plays is None:
-            self.now.step(accelerations)
-            return
-        play = self._plays[0]
-        next(play)
-        if self._left == 0:
-            # What is left of it makes the observation whole.
-            next(play, None)
-
-    def _lead(self) -> tuple[Floats, float]:
-        seconds = np.nan
-        if self._left == 0:
-            action, seconds = self._ask(self._now.arrays.observation.pull().copy())
-            self._now.write(action[None])
-            self._plays = self._now.play(), self._ahead.play()
-            self._left = self._now.options.action.repeat
-        # The base policy, if there is one, must see the cues that have come since.
-        self._twin.follow()
-        assert self._plays is not None
-        next(self._plays[1])
-        self._left -= 1
-        return self._ahead.asked[0], seconds
-
-
-def make_machine(
-    policy: Policy | TaskPolicy | ForeknowingPolicy, platform: Platform, vestibular: str = "zacharias"
-) -> LiveMachine:
-    """The machine that a policy needs, warmed up: its kernels are compiled, and the policy has acted once.
+    Args:
+        policy: A policy, or any object with ``predict``.
+        platform: The machine.
+        vestibular: Perception model by name.
 
     Raises:
         ConfigurationError: the policy must know the drive before it begins, or was made for another machine,
             time step or perception model.
     """
-    name = getattr(policy, "name", type(policy).__name__)
-    if isinstance(policy, ForeknowingPolicy):
+    policy = as_policy(policy)
+    if policy.needs_drive:
         raise ConfigurationError(
-            f"{name} must know the drive before it begins; live cues are not known ahead"
+            f"{policy.name} must know the drive before it begins; live cues are not known ahead"
         )
-    model = get_vestibular_model(vestibular)
-    if isinstance(policy, TaskPolicy):
-        return _warmed(TaskMachine(policy, platform, model), name)
-    own = getattr(policy, "dt", TIME_STEP)
-    if own != TIME_STEP:
-        raise ConfigurationError(f"the policy's time step is {own} s, the machine's {TIME_STEP} s")
-    return _warmed(FreeMachine(policy, platform, model), name)
-
-
-def _warmed(machine: LiveMachine, name: str) -> LiveMachine:
-    """The machine after a step of every kind, at rest again: the first in real time takes no longer then."""
+    if policy.time_step not in (None, TIME_STEP):
+        raise ConfigurationError(
+            f"the policy's time step is {policy.time_step} s, the machine's {TIME_STEP} s"
+        )
+    machine = LiveMachine(policy.for_platform(platform), platform, get_vestibular_model(vestibular))
+    # A step of every kind, then at rest again: the first in real time takes no longer than the others.
     try:
         for _ in range(_WARMING):
             machine.catch_up(AT_REST)
             machine.begin()
             machine.act()
     except Exception as error:
-        raise ConfigurationError(f"{name} fails with a car that stands: {explain(error)}") from None
+        raise ConfigurationError(f"{policy.name} fails with a car that stands: {explain(error)}") from None
     machine.move(np.zeros(N_AXES))
     machine.catch_up(AT_REST)
     machine.reset()

@@ -20,7 +20,7 @@ from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from ...envs.simulator.kernels.observation import read
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
-from ..policy import Array, checked_episode_start, checked_observation, wrong_state
+from ..policy import Array, Information, Policy, checked_episode_start, checked_observation, wrong_state
 from ..symbolic import SymbolicMachine, cs
 from .parameters import MpcParameters
 from .prediction import REST, Floats, Forecaster
@@ -171,7 +171,7 @@ class Counts:
         self.relaxed += plan.relaxed > _RELAXED
 
 
-class PredictiveController:
+class PredictiveController(Policy):
     """Model predictive control, linear or nonlinear.
 
     Args:
@@ -190,7 +190,9 @@ class PredictiveController:
         planner: Planner | None = None,
         cues: CueTrace | None = None,
     ) -> None:
-        self.name, self.dt, self.parameters = name, TIME_STEP, parameters
+        self.name, self.time_step, self.parameters = name, TIME_STEP, parameters
+        self.platform: Platform = platform
+        self.information = Information.ahead(parameters.forecast.preview)
         self._planner = planner or Planner(platform, parameters)
         self._forecast = Forecaster(self._planner.grid, parameters.forecast, cues)
         self._brakes = Brakes(platform)
@@ -200,7 +202,7 @@ class PredictiveController:
         self._blas: Any = ThreadpoolController()
 
     @property
-    def notes(self) -> Mapping[str, str]:
+    def statistics(self) -> Mapping[str, str]:
         """Statistics of the drive so far, for a trajectory's metadata."""
         return {f"mpc_{name}": str(value) for name, value in vars(self._counts).items()}
 
@@ -289,7 +291,7 @@ def _checked_state(state: Any, n: int) -> list[Memory] | list[None]:
     return state
 
 
-class PreviewController:
+class PreviewController(Policy):
     """Model predictive control with preview: it needs the drive before it begins.
 
     Args:
@@ -299,8 +301,10 @@ class PreviewController:
     """
 
     def __init__(self, platform: Platform, parameters: MpcParameters, name: str = "mpc-preview") -> None:
-        self.name, self.dt, self.parameters = name, TIME_STEP, parameters
-        self._platform, self._planner = platform, Planner(platform, parameters)
+        self.name, self.time_step, self.parameters = name, TIME_STEP, parameters
+        self.platform: Platform = platform
+        self.information = Information.ahead(parameters.forecast.preview)
+        self._planner = Planner(platform, parameters)
 
     def for_drive(self, cues: CueTrace) -> PredictiveController:
         """The policy for one drive.
@@ -308,7 +312,7 @@ class PreviewController:
         Args:
             cues: The drive, at the machine's time step.
         """
-        return PredictiveController(self._platform, self.parameters, self.name, self._planner, cues)
+        return PredictiveController(self.platform, self.parameters, self.name, self._planner, cues)
 
 
 def make_mpc(

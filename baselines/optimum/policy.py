@@ -19,7 +19,7 @@ from ...envs.perception import VestibularModel, get_vestibular_model
 from ...envs.platform import Platform, get_platform
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE, read
 from ...envs.simulator.simulator import N_AXES
-from ..policy import checked_episode_start, checked_observation, wrong_state
+from ..policy import WHOLE_DRIVE, Policy, checked_episode_start, checked_observation, wrong_state
 from .plan import Plan, key_of, load_plan, store_plan
 from .program import OptimumOptions
 from .windows import Planner
@@ -80,7 +80,7 @@ _SAME: Final = 1e-3
 """Largest difference of two poses that count as one, m and rad: less than a plan's distance from limits."""
 
 
-class Optimum:
+class Optimum(Policy):
     """The offline optimum: the best accelerations for a drive that is known from beginning to end.
 
     Args:
@@ -91,6 +91,8 @@ class Optimum:
         progress: Whether a long solve shows a bar on a terminal.
     """
 
+    information = WHOLE_DRIVE
+
     def __init__(
         self,
         platform: Platform | None = None,
@@ -99,7 +101,7 @@ class Optimum:
         cached: bool = True,
         progress: bool = True,
     ) -> None:
-        self.platform = platform or get_platform("paper")
+        self.platform: Platform = platform or get_platform("paper")
         self.parameters = options or OptimumOptions()
         self.vestibular = vestibular or get_vestibular_model("zacharias")
         self.name = "optimum" if self.parameters.objective == "J" else "optimum-perceived"
@@ -143,7 +145,7 @@ class Optimum:
         return plan
 
 
-class PlannedDrive:
+class PlannedDrive(Policy):
     """Plays the plan for one drive. A machine that begins elsewhere than planned gets a plan of its own.
 
     Args:
@@ -151,13 +153,15 @@ class PlannedDrive:
         cues: The drive.
     """
 
+    information = WHOLE_DRIVE
+
     def __init__(self, optimum: Optimum, cues: CueTrace) -> None:
         self.name, self.parameters = optimum.name, optimum.parameters
         self.plan = optimum.plan(cues)
         self._optimum, self._cues = optimum, cues
 
     @property
-    def notes(self) -> Mapping[str, str]:
+    def statistics(self) -> Mapping[str, str]:
         """Report of the solve, for a trajectory's metadata."""
         return self.plan.report.notes()
 

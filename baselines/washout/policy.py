@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -10,10 +11,10 @@ import warp as wp
 from numpy.typing import NDArray
 
 from ...envs.arrays import real, vec9
-from ...envs.platform.machines import Cab
+from ...envs.platform.machines import Cab, Platform
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
-from ..policy import Array, checked_episode_start, checked_observation, wrong_state
+from ..policy import Array, Policy, checked_episode_start, checked_observation, wrong_state
 from .families import FAMILIES, FamilyParameters, family_of, load_of, load_parameters
 from .kernels.launch import Kernels
 
@@ -59,7 +60,7 @@ def _as_bytes(memory: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(memory).view(np.uint8)
 
 
-class WashoutPolicy(Generic[P]):
+class WashoutPolicy(Policy, Generic[P]):
     """A washout as a policy.
 
     Args:
@@ -83,7 +84,7 @@ class WashoutPolicy(Generic[P]):
         self.family = FAMILIES[self.algorithm] if self.algorithm else family_of(given)
         self.name = self.parameters.name
         self.cab = cab or Cab()
-        self.dt = dt
+        self.time_step: float = dt
         self._start = start_pose(self.parameters)
         kernels = self.family.kernels
         self._kernel_parameters = wp.array(
@@ -95,12 +96,19 @@ class WashoutPolicy(Generic[P]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt)
+        return type(self), (self.parameters, self.cab, self.time_step)
 
     @property
-    def start(self) -> Array:
+    def start_pose(self) -> Array:
         """(9,) pose to begin a drive at."""
         return self._start.copy()
+
+    def on(self, platform: Platform) -> Policy:
+        """The washout on a machine; without a turntable it yaws with the hexapod, k_T = 0, as EST3 does."""
+        if platform.turntable is not None or not self.parameters.turntable_share:
+            return self
+        parameters: Any = self.parameters
+        return type(self)(replace(parameters, turntable_share=0.0), platform.cab, self.time_step)
 
     def predict(
         self,
@@ -135,7 +143,7 @@ class WashoutPolicy(Generic[P]):
         return self._buffers_with(n, self._kernel_parameters, parameters_of)
 
     def _buffers_with(self, n: int, parameters: Any, parameters_of: Any) -> _Buffers:
-        self._buffers[n] = _Buffers(self.family.kernels, n, parameters, parameters_of, self.dt)
+        self._buffers[n] = _Buffers(self.family.kernels, n, parameters, parameters_of, self.time_step)
         return self._buffers[n]
 
 

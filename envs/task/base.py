@@ -6,7 +6,7 @@ Any policy that follows Stable-Baselines3's convention can be one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,45 +19,13 @@ from .kernels.action import Mode
 Array = NDArray[Any]
 
 
-@runtime_checkable
-class BasePolicy(Protocol):
-    """What the mode "residual" needs.
-
-    Its state must be None or an array with one row an environment.
-    """
-
-    def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
-    ) -> tuple[Array, Any]:
-        """Accelerations (n, 9), m/s^2 and rad/s^2, for observations (n, OBSERVATION_SIZE), and its state."""
-        ...
-
-
-@runtime_checkable
-class ScheduledPolicy(Protocol):
-    """What the mode "gains" needs: a policy whose parameters are set anew at every step."""
-
-    @property
-    def gain_names(self) -> tuple[str, ...]:
-        """What each entry of an action sets."""
-        ...
-
-    def schedule(
-        self, observation: Array, gains: Array, state: Any = None, episode_start: Array | None = None
-    ) -> tuple[Array, Any]:
-        """Accelerations (n, 9) with gains (n, k) in [-1, 1], 0 for the policy as it is, and its state."""
-        ...
-
-
 class Base:
     """The base policy of a batch, with its memory.
 
     Args:
-        policy: The policy, or None.
+        policy: The policy, or None. Mode "residual" needs ``predict`` (accelerations for observations);
+            mode "gains" needs ``gain_names`` and ``schedule(observation, gains, state, episode_start)``.
+            Its state must be None or an array with one row an environment.
         mode: What actions mean.
         n: Environments.
 
@@ -66,10 +34,21 @@ class Base:
     """
 
     def __init__(self, policy: Any, mode: Mode, n: int) -> None:
-        _check(policy, mode)
         self.policy = policy
         self.residual, self.scheduled = mode == "residual", mode == "gains"
-        self.action_size = len(policy.gain_names) if self.scheduled else len(AXES)
+        self.action_size = len(AXES)
+        if policy is not None and not (self.residual or self.scheduled):
+            raise ConfigurationError(f"base= is of no use with action.mode {mode!r}; leave it out")
+        try:
+            if self.residual:
+                self._predict = policy.predict
+            elif self.scheduled:
+                self._schedule, self.action_size = policy.schedule, len(policy.gain_names)
+        except AttributeError:
+            method = "predict" if self.residual else "schedule"
+            raise ConfigurationError(
+                f"action.mode {mode!r} needs base=, a policy with {method}(...)"
+            ) from None
         self._begins = np.ones(n, dtype=bool)
         self._state: Any = None
 
@@ -90,9 +69,9 @@ class Base:
         """
         begins = self._begins.copy()
         if self.scheduled:
-            action, state = self.policy.schedule(observation, gains, self._state, begins)
+            action, state = self._schedule(observation, gains, self._state, begins)
         else:
-            action, state = self.policy.predict(observation, self._state, begins, deterministic=True)
+            action, state = self._predict(observation, self._state, begins, deterministic=True)
         action = np.reshape(action, out.shape)
         if mask is None or self._state is None or state is None:
             out[...], self._state = action, state
@@ -113,12 +92,3 @@ class Base:
         self._begins[...] = snapshot["base_begins"]
         state = snapshot.get("base_state")
         self._state = None if state is None else np.array(state)
-
-
-def _check(policy: Any, mode: Mode) -> None:
-    if mode == "residual" and not isinstance(policy, BasePolicy):
-        raise ConfigurationError("action.mode 'residual' needs base=, a policy with predict(...)")
-    if mode == "gains" and not isinstance(policy, ScheduledPolicy):
-        raise ConfigurationError("action.mode 'gains' needs base=, a policy with schedule(...)")
-    if policy is not None and mode not in ("residual", "gains"):
-        raise ConfigurationError(f"base= is of no use with action.mode {mode!r}; leave it out")

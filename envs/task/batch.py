@@ -176,6 +176,7 @@ class Batch:
         n: Environments.
         options: Everything that can be chosen.
         drives: Cue traces to drive instead of those of ``options.episode``.
+        platforms: Machines to draw from instead of those of ``options``.
         base: The base policy, where ``options.action.mode`` needs one.
         device: "cpu" or a CUDA device of Warp.
     """
@@ -186,6 +187,7 @@ class Batch:
         options: TaskOptions,
         *,
         drives: Sequence[CueTrace] | None = None,
+        platforms: Sequence[Platform] | None = None,
         base: Any = None,
         device: str = "cpu",
     ) -> None:
@@ -194,7 +196,7 @@ class Batch:
         self.n, self.options = n, options
         self.drives = self._library(drives)
         self.simulator = Simulator(
-            machines_of(options),
+            machines_of(options) if platforms is None else platforms,
             self.drives,
             drive_of=np.zeros(n, dtype=np.int32),
             vestibular=get_vestibular_model(options.vestibular),

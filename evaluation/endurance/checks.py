@@ -15,7 +15,7 @@ from ...envs.platform.kinematics import leg_motion
 from ...envs.platform.limits import limits_exceeded
 from ...envs.simulator.simulator import Simulator
 from ..metrics import Criteria, cue_error
-from .batch_drivers import BatchDriver
+from ..rollout import Rollout
 from .results import Endured
 
 Floats = NDArray[np.float64]
@@ -99,11 +99,8 @@ class TrueLimits:
         )
 
 
-# What happens in a batch of drives: errors of the cues, use of limits, and limits exceeded.
-
-
 _ROWS: Final = 8192
-"""Time steps of drives that are looked at together: some ten megabytes."""
+"""Time steps of drives that are checked together: some ten megabytes."""
 
 _CHANNELS: Final = (
     ("reference_cue", "simulator_cue", "cue_error"),
@@ -112,7 +109,7 @@ _CHANNELS: Final = (
 
 
 class Watch:
-    """Looks at the states of a simulator, a block of time steps at a time.
+    """Cue errors and limits of a simulator's drives, a block of time steps at a time.
 
     Args:
         simulator: With the drives.
@@ -131,26 +128,26 @@ class Watch:
         self.errors = {name: np.zeros(n) for _, _, name in _CHANNELS}
 
     def note(self) -> bool:
-        """Take the state now; returns whether a block is full and was looked at."""
+        """Take the state now; returns whether a block was full and was checked."""
         # As bytes, which NumPy copies at once; structures it copies field by field.
         self._rows[self._filled].view(np.uint8)[...] = self._simulator.state.view(np.uint8)
         self._filled += 1
         if self._filled < len(self._rows):
             return False
-        self.look()
+        self.check()
         return True
 
-    def look(self) -> None:
-        """Look at what was noted since the last time."""
+    def check(self) -> None:
+        """Check the states noted since the last time."""
         rows, self._filled = self._rows[: self._filled], 0
         if not len(rows):
             return
         self.samples += len(rows)
         self.at_limit += np.count_nonzero(rows["limits"], axis=0)
-        found = self.limits.exceeded(rows["motion"])
-        for kind, flags in found.items():
+        exceeded = self.limits.exceeded(rows["motion"])
+        for kind, flags in exceeded.items():
             self.exceeded[kind] += flags.sum(axis=0)
-        self.beyond += np.any(list(found.values()), axis=0).sum(axis=0)
+        self.beyond += np.any(list(exceeded.values()), axis=0).sum(axis=0)
         for reference, simulated, name in _CHANNELS:
             self.errors[name] += self._errors(rows[reference], rows[simulated])
 
@@ -166,30 +163,30 @@ def _cues(side: NDArray[Any]) -> Floats:
     return np.hstack([flat["force"], flat["rate"]]).astype(np.float64)
 
 
-def watched(
-    driver: BatchDriver, platform: Platform, tell: Callable[[int], None] = lambda steps: None
+def drive_and_check(
+    run: Rollout, platform: Platform, progress: Callable[[int], None] = lambda steps: None
 ) -> tuple[list[Endured], dict[str, float]]:
     """Drive drives of one length to their end.
 
     Args:
-        driver: At rest at the first sample.
+        run: At the first sample, with actions made finite.
         platform: The machine as it should be.
-        tell: Called now and then with the time steps done since; what it raises ends the drive.
+        progress: Called now and then with the time steps done since; what it raises ends the drive.
 
     Returns:
-        What came of each drive, and of all: the largest use of each limit and the least clearance of
+        The result of each drive, and of all: the largest use of each limit and the least clearance of
         singular poses.
     """
-    watch = Watch(driver.simulator, platform)
-    steps, told = len(driver.simulator.drives[0]) - 1, 0
+    watch = Watch(run.simulator, platform)
+    done = reported = 0
     watch.note()
-    for k, _ in zip(range(1, steps + 1), driver.steps(), strict=False):
+    for done, _ in enumerate(run.steps(), start=1):
         if watch.note():
-            tell(k - told)
-            told = k
-    watch.look()
-    tell(steps - told)
-    return _outcomes(watch, driver.not_finite), {**watch.limits.use, "clearance": watch.limits.clearance}
+            progress(done - reported)
+            reported = done
+    watch.check()
+    progress(done - reported)
+    return _outcomes(watch, run.not_finite), {**watch.limits.use, "clearance": watch.limits.clearance}
 
 
 def _outcomes(watch: Watch, not_finite: NDArray[np.int64]) -> list[Endured]:

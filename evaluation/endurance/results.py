@@ -1,4 +1,8 @@
-"""What policies are put through: drives of all kinds in all cars, on machines of many actuators."""
+"""Endurance: its options, the result of every drive, summaries, kept files and tables.
+
+A kept file holds the finished drives of one policy, so that a run that was stopped goes on, and can be made
+longer.
+"""
 
 from __future__ import annotations
 
@@ -39,11 +43,11 @@ _EVERY_KIND: Final = RandomDrives(**_EVENLY, roughness=(0.0, 600.0), cars=tuple(
 class Endurance:
     """Drives and machines; each drive is driven on the machine as it should be and on a slower one.
 
-    Lag and dead time reach to those of ``motion-cueing robustness``, both at once; 30 to 90 rad/s are 5 to
-    14 Hz, what motion bases are said to have (from memory).
+    Lag and dead time reach to those of ``motion-cueing robustness``, both at once. Lags of 30 to 90 rad/s are
+    5 to 14 Hz, the range of common motion bases (from memory).
 
     Args:
-        drives: What drives are drawn from; default: every kind of road in every car, equally often,
+        drives: Distribution of the drives; default: every kind of road in every car, equally often,
             smooth to rough.
         duration: Of a drive, s.
         friction: Range of a factor on the tires' friction.
@@ -64,7 +68,7 @@ class Endurance:
         assert self.randomization(SLOWER).platforms == self.machines
 
     def randomization(self, condition: str) -> RandomizationOptions:
-        """What an environment draws under a condition."""
+        """The randomization of an environment under a condition."""
         if condition == NOMINAL:
             return RandomizationOptions()
         return RandomizationOptions(
@@ -79,9 +83,6 @@ class Endurance:
         return machines_of(TaskOptions(platform=platform, randomization=self.randomization(condition)))
 
 
-# What a policy withstood, drive by drive and in all; as JSON and CSV.
-
-
 SCHEMA: Final = 1
 """Version of ``endurance.json``."""
 
@@ -93,10 +94,10 @@ class Endured:
     Args:
         samples: Time steps, the start among them.
         cue_error: J; None where the machine's motion is not finite.
-        perceived_cue_error: J of the sensed signals.
+        perceived_cue_error: J of the perceived cues.
         at_limit: Share of time with any actuator held back by any limit.
         beyond: Samples at which the true motion is beyond any limit.
-        exceeded: Samples by what is exceeded, see ``limits.KINDS``.
+        exceeded: Samples by kind of limit, see :data:`~.checks.KINDS`.
         actions_not_finite: Actions with an entry that is no finite number.
     """
 
@@ -115,11 +116,11 @@ class EnduredDrive:
 
     Args:
         name: Kind of road and seed.
-        seed: All about the drive follows from it.
+        seed: Everything about the drive follows from it.
         car: Name of the car.
         friction: Factor on the friction of its tires.
         machine: Index of the slower machine.
-        conditions: What came of it, by condition.
+        conditions: Result by condition.
     """
 
     name: str
@@ -137,7 +138,7 @@ class EnduredDrive:
 
 @configuration
 class Extremes:
-    """The nearest that all drives under a condition came to limits.
+    """The closest that all drives under a condition came to the limits.
 
     Args:
         position: Largest share of a way to an end of travel.
@@ -151,22 +152,22 @@ class Extremes:
     acceleration: float = 0.0
     clearance: float = 1.0
 
-    def with_found(self, found: dict[str, float]) -> Extremes:
-        """These, or what was found where that is nearer."""
+    def merged(self, others: Mapping[str, float]) -> Extremes:
+        """The closer ones of these and others, by name."""
         largest = {
-            name: max(getattr(self, name), found[name]) for name in ("position", "rate", "acceleration")
+            name: max(getattr(self, name), others[name]) for name in ("position", "rate", "acceleration")
         }
-        return Extremes(**largest, clearance=min(self.clearance, found["clearance"]))
+        return Extremes(**largest, clearance=min(self.clearance, others["clearance"]))
 
 
 @configuration
 class PolicyEndurance:
-    """What a policy withstood.
+    """The finished drives of a policy.
 
     Args:
-        key: Of all that makes drives what they are; see ``store.endurance_key``.
-        drives: Those that are done.
-        extremes: By condition; of all drives that are kept, also where fewer are asked for.
+        key: Hash of everything that drives depend on; see :func:`endurance_key`.
+        drives: Finished drives.
+        extremes: By condition; of all kept drives, also where fewer are requested.
     """
 
     key: str
@@ -189,7 +190,7 @@ class EnduranceSummary:
         slower_perceived_cue_error: The same on the slower ones.
         at_limit: Mean share of time with any actuator at any limit, by condition.
         beyond: Samples beyond any limit, under both conditions.
-        exceeded: The same by what is exceeded.
+        exceeded: The same by kind of limit.
         actions_not_finite: Under both conditions.
     """
 
@@ -228,8 +229,8 @@ class EnduranceResults(Headed):
 
     Args:
         platform: Name of the machine.
-        endurance: What policies were put through.
-        finished: Whether all drives that were asked for are done.
+        endurance: Options of the drives.
+        finished: Whether all requested drives are done.
         summaries: By policy.
         policies: By name.
     """
@@ -248,8 +249,8 @@ class EnduranceResults(Headed):
         save_rows(list(self._rows()), path)
 
     def _rows(self) -> Iterator[dict[str, Any]]:
-        for policy, found in self.policies.items():
-            for drive in found.drives:
+        for policy, endurance in self.policies.items():
+            for drive in endurance.drives:
                 about = {
                     name: getattr(drive, name) for name in ("name", "seed", "car", "friction", "machine")
                 }
@@ -277,8 +278,8 @@ def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSum
         perceived_cue_error=_mean([one.perceived_cue_error for one in nominal]),
         slower_perceived_cue_error=_mean([one.perceived_cue_error for one in slower]),
         at_limit={
-            name: sum(one.at_limit for one in found) / len(found)
-            for name, found in ((NOMINAL, nominal), (SLOWER, slower))
+            name: sum(one.at_limit for one in results) / len(results)
+            for name, results in ((NOMINAL, nominal), (SLOWER, slower))
         },
         beyond=sum(one.beyond for one in both),
         exceeded={kind: sum(one.exceeded[kind] for one in both) for kind in both[0].exceeded},
@@ -288,10 +289,10 @@ def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSum
 
 def by_kind(drives: Sequence[EnduredDrive]) -> dict[str, list[EnduredDrive]]:
     """Drives by kind of road, in the order they first come in."""
-    found: dict[str, list[EnduredDrive]] = {}
+    kinds: dict[str, list[EnduredDrive]] = {}
     for drive in drives:
-        found.setdefault(drive.kind, []).append(drive)
-    return found
+        kinds.setdefault(drive.kind, []).append(drive)
+    return kinds
 
 
 def _flat(endured: Endured) -> dict[str, Any]:
@@ -311,9 +312,6 @@ def _or_inf(value: float | None) -> float:
 
 def _ratio(over: float | None, under: float | None) -> float | None:
     return over / under if over is not None and under else None
-
-
-# Drives that are done, in files: one a policy. So a run that was stopped goes on, and can be made longer.
 
 
 FOLDER: Final = "drives"
@@ -360,29 +358,29 @@ class EnduranceStore:
         done = {drive.seed for drive in self.kept.drives}
         return [seed for seed in seeds if seed not in done]
 
-    def keep(self, drives: Collection[EnduredDrive], found: Mapping[str, dict[str, float]]) -> None:
-        """Write drives down at once, whole or not at all.
+    def keep(self, drives: Collection[EnduredDrive], extremes: Mapping[str, dict[str, float]]) -> None:
+        """Write finished drives at once, whole or not at all.
 
         Args:
-            drives: That are done.
-            found: Extremes of them by condition.
+            drives: The drives.
+            extremes: Of them, by condition.
         """
         before = self.kept
-        extremes = {
-            condition: before.extremes.get(condition, Extremes()).with_found(values)
-            for condition, values in found.items()
+        merged = {
+            condition: before.extremes.get(condition, Extremes()).merged(values)
+            for condition, values in extremes.items()
         }
-        self.kept = PolicyEndurance(before.key, (*before.drives, *drives), extremes)
+        self.kept = PolicyEndurance(before.key, (*before.drives, *drives), merged)
         write_text(self._path, json.dumps(to_dict(self.kept), allow_nan=False) + "\n")
 
 
 def endurance_key(platform: Platform, endurance: Endurance, policy: Mapping[str, Any]) -> str:
-    """A hash of all that makes a policy's drives what they are, but their seeds.
+    """A hash of everything that a policy's drives depend on, but their seeds.
 
     Args:
         platform: The machine.
-        endurance: What policies are put through.
-        policy: Of ``study_store.identity``.
+        endurance: Options of the drives.
+        policy: From :func:`~..studies.store.identity`.
     """
     whole = {
         "version": package_version(),
@@ -391,9 +389,6 @@ def endurance_key(platform: Platform, endurance: Endurance, policy: Mapping[str,
         "policy": dict(policy),
     }
     return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
-
-
-# The tables of an endurance.
 
 
 _SHARES: Final = ("position", "rate", "acceleration")
@@ -408,20 +403,20 @@ def tables(results: EnduranceResults) -> list[TextTable]:
 def _safety(results: EnduranceResults) -> TextTable:
     header = ("policy", "drives", "hours", "samples beyond a limit", "not finite", *_SHARES, "clearance")
     rows = []
-    for name, found in results.summaries.items():
+    for name, summary in results.summaries.items():
         extremes = list(results.policies[name].extremes.values())
-        nearest = [max(getattr(one, what) for one in extremes) for what in _SHARES]
+        largest = [max(getattr(one, what) for one in extremes) for what in _SHARES]
         least = min(one.clearance for one in extremes)
-        cells = (f"{found.hours:.2f} × 2", f"{found.beyond}", f"{found.actions_not_finite}")
-        shares = tuple(f"{share:.4f}" for share in (*nearest, least))
-        rows.append((name, f"{found.drives}", *cells, *shares))
+        cells = (f"{summary.hours:.2f} × 2", f"{summary.beyond}", f"{summary.actions_not_finite}")
+        shares = tuple(f"{share:.4f}" for share in (*largest, least))
+        rows.append((name, f"{summary.drives}", *cells, *shares))
     return TextTable("Limits: samples beyond them, largest use (1 is the limit)", header, tuple(rows))
 
 
 def _errors(results: EnduranceResults) -> TextTable:
     rows = [
-        (name, *_error_cells(found), found.worst, number(found.worst_cue_error))
-        for name, found in results.summaries.items()
+        (name, *_error_cells(summary), summary.worst, number(summary.worst_cue_error))
+        for name, summary in results.summaries.items()
     ]
     title = "Cue errors, on the machine as it should be and on slower ones"
     return TextTable(title, ("policy", *_ERRORS, "worst drive", "its J slower"), tuple(rows))
@@ -436,15 +431,15 @@ def _kinds(results: EnduranceResults) -> TextTable:
     return TextTable("By kind of road", ("policy", "kind", "drives", *_ERRORS), tuple(sorted(rows)))
 
 
-def _error_cells(found: EnduranceSummary) -> tuple[str, ...]:
+def _error_cells(summary: EnduranceSummary) -> tuple[str, ...]:
     return (
-        number(found.cue_error),
-        number(found.slower_cue_error),
-        _ratio_cell(found.ratio),
-        number(found.perceived_cue_error),
-        _ratio_cell(found.perceived_ratio),
-        percent(found.at_limit[NOMINAL]),
-        percent(found.at_limit[SLOWER]),
+        number(summary.cue_error),
+        number(summary.slower_cue_error),
+        _ratio_cell(summary.ratio),
+        number(summary.perceived_cue_error),
+        _ratio_cell(summary.perceived_ratio),
+        percent(summary.at_limit[NOMINAL]),
+        percent(summary.at_limit[SLOWER]),
     )
 
 

@@ -1,4 +1,8 @@
-"""The drives, each with all that its seed stands for: road, car, friction, machine."""
+"""Endurance: policies through hours of random drives, a batch at a time, on nominal and slower machines.
+
+Everything about a drive follows from its seed: road, car, friction, machine. Finished drives are kept policy
+by policy, so that a run that was stopped goes on, and can be made longer.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from ...baselines.interface import Machines
+from ...baselines.policy import Policy
 from ...envs.car.simulation import Plan, simulate
 from ...envs.cues import CueTrace
 from ...envs.errors import DataError
@@ -17,10 +23,9 @@ from ...envs.platform import Platform
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.task.drives import slippery
 from ..policies import make_policy
-from ..rollout import AnyPolicy
+from ..rollout import Rollout
 from ..studies.store import identity
-from .batch_drivers import batch_driver
-from .checks import watched
+from .checks import drive_and_check
 from .results import (
     NOMINAL,
     SLOWER,
@@ -39,7 +44,7 @@ _FRICTION_STREAM: Final = 3
 
 @dataclass(frozen=True, eq=False)
 class SeededDrive:
-    """A drive; everything about it follows from its seed.
+    """A drive and what its seed stands for.
 
     Args:
         seed: Of the drive.
@@ -57,9 +62,9 @@ class SeededDrive:
 
 
 def seeded_drives(endurance: Endurance, seeds: Sequence[int]) -> list[SeededDrive]:
-    """The drives of seeds; those whose car leaves the range of its model are left out.
+    """The drives of seeds; those whose car leaves the range of its model are skipped.
 
-    A car that slides off its path stays: its driver feels that, too.
+    A car that slides off its path stays in: its driver feels that, too.
 
     Raises:
         ConfigurationError: a seed or the duration is out of range.
@@ -97,142 +102,134 @@ def _alone(plan: Plan) -> CueTrace | None:
         return None
 
 
-# Policies through many drives, a batch at a time, with the machine as it should be and with slower ones.
-
-
-Tell = Callable[[str, float], None]
-"""Told what is driven and the seconds of drive that were done since the last time."""
+Progress = Callable[[str, float], None]
+"""Given what is driven, and the seconds of drive done since the last call."""
 
 CONDITIONS: Final = (NOMINAL, SLOWER)
 
 
 class Stopped(Exception):  # noqa: N818  (not an error)
-    """Raised by a :data:`Tell` to stop."""
+    """Raised by a :data:`Progress` to stop."""
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is to be driven.
+class EnduranceRequest:
+    """The drives of a run.
 
     Args:
         endurance: What policies are put through.
         platform: The machine.
-        policies: Name or file by label.
+        policies: By label, as :func:`~..policies.make_policy` takes them.
         seeds: Of the drives.
         batch: Drives side by side.
-        folder: Where drives that are done are kept.
+        folder: Where finished drives are kept.
     """
 
     endurance: Endurance
     platform: Platform
-    policies: Mapping[str, str]
+    policies: Mapping[str, Any]
     seeds: Sequence[int]
     batch: int
     folder: Path
 
 
 @dataclass
-class Found:
-    """What came of it.
+class EnduranceOutcome:
+    """The result of a run.
 
     Args:
-        policies: By label, of the drives that were asked for.
+        policies: By label, with the drives of the request.
         driven: Drives that were driven now.
-        left_out: Seeds whose car left the range of its model.
-        finished: Whether everything was driven.
+        skipped: Seeds whose car left the range of its model.
+        finished: Whether every drive is done.
     """
 
     policies: dict[str, PolicyEndurance] = field(default_factory=dict)
     driven: int = 0
-    left_out: list[int] = field(default_factory=list)
+    skipped: list[int] = field(default_factory=list)
     finished: bool = True
 
 
-class Run:
+class EnduranceRun:
     """Drives what is not done yet.
 
     Args:
-        asked: What is to be driven.
+        request: The drives.
         fresh: Forget what these policies have driven.
 
     Raises:
         MotionCueingError: there is no such policy, or it was not made for the machine.
     """
 
-    def __init__(self, asked: Asked, fresh: bool = False) -> None:
-        self._asked, self._found = asked, Found()
+    def __init__(self, request: EnduranceRequest, fresh: bool = False) -> None:
+        self._request, self._outcome = request, EnduranceOutcome()
         # All of them first: a wrong name forgets nothing.
-        self._policies: dict[str, AnyPolicy] = {
-            label: make_policy(name, asked.platform) for label, name in asked.policies.items()
+        self._policies: dict[str, Policy] = {
+            label: make_policy(given, request.platform) for label, given in request.policies.items()
         }
         self._stores: dict[str, EnduranceStore] = {}
-        for label, name in asked.policies.items():
-            about = identity(name, self._policies[label])
-            key = endurance_key(asked.platform, asked.endurance, about)
-            self._stores[label] = EnduranceStore(asked.folder, label, key, fresh)
+        for label, policy in self._policies.items():
+            about = identity(request.policies[label], policy)
+            key = endurance_key(request.platform, request.endurance, about)
+            self._stores[label] = EnduranceStore(request.folder, label, key, fresh)
 
     @property
     def seconds(self) -> float:
         """Of drive that are to be done, all policies and conditions."""
-        drives = sum(len(store.missing(self._asked.seeds)) for store in self._stores.values())
-        return drives * len(CONDITIONS) * self._asked.endurance.duration
+        drives = sum(len(store.missing(self._request.seeds)) for store in self._stores.values())
+        return drives * len(CONDITIONS) * self._request.endurance.duration
 
-    def drive(self, tell: Tell) -> Found:
-        """Drive until everything is done, or ``tell`` raises :class:`Stopped`; what is done is kept."""
+    def drive(self, progress: Progress) -> EnduranceOutcome:
+        """Drive until everything is done, or ``progress`` raises :class:`Stopped`; what is done is kept."""
         try:
             for drives in self._batches():
                 for label in self._policies:
-                    self._drive_batch(label, drives, tell)
+                    self._drive_batch(label, drives, progress)
         except Stopped:
-            self._found.finished = False
-        wanted = set(self._asked.seeds)
+            self._outcome.finished = False
+        requested = set(self._request.seeds)
         for label, store in self._stores.items():
             kept = store.kept
-            chosen = tuple(drive for drive in kept.drives if drive.seed in wanted)
-            self._found.policies[label] = PolicyEndurance(kept.key, chosen, kept.extremes)
-        return self._found
+            chosen = tuple(drive for drive in kept.drives if drive.seed in requested)
+            self._outcome.policies[label] = PolicyEndurance(kept.key, chosen, kept.extremes)
+        return self._outcome
 
     def _batches(self) -> Iterator[list[SeededDrive]]:
         """Drives that any policy has not done yet."""
-        missing = list(
-            dict.fromkeys(chain(*(store.missing(self._asked.seeds) for store in self._stores.values())))
-        )
-        for first in range(0, len(missing), self._asked.batch):
-            seeds = missing[first : first + self._asked.batch]
-            drives = seeded_drives(self._asked.endurance, seeds)
+        seeds, size = self._request.seeds, self._request.batch
+        missing = list(dict.fromkeys(chain(*(store.missing(seeds) for store in self._stores.values()))))
+        for first in range(0, len(missing), size):
+            batch = missing[first : first + size]
+            drives = seeded_drives(self._request.endurance, batch)
             made = {drive.seed for drive in drives}
-            self._found.left_out += [seed for seed in seeds if seed not in made]
+            self._outcome.skipped += [seed for seed in batch if seed not in made]
             yield drives
 
-    def _drive_batch(self, label: str, drives: Sequence[SeededDrive], tell: Tell) -> None:
+    def _drive_batch(self, label: str, drives: Sequence[SeededDrive], progress: Progress) -> None:
         missing = set(self._stores[label].missing([drive.seed for drive in drives]))
         drives = [drive for drive in drives if drive.seed in missing]
         if not drives:
             return
-        outcomes: dict[str, list[Endured]] = {}
+        results: dict[str, list[Endured]] = {}
         extremes: dict[str, dict[str, float]] = {}
+        endurance, platform = self._request.endurance, self._request.platform
         for condition in CONDITIONS:
-            what = f"{label}, {condition}"
-            outcomes[condition], extremes[condition] = self._under(condition, label, drives, what, tell)
-        self._stores[label].keep(_records(drives, outcomes), extremes)
-        self._found.driven += len(drives)
 
-    def _under(
-        self, condition: str, label: str, drives: Sequence[SeededDrive], what: str, tell: Tell
-    ) -> tuple[list[Endured], dict[str, float]]:
-        asked = self._asked
-        driver = batch_driver(
-            self._policies[label],
-            [drive.cues for drive in drives],
-            asked.platform,
-            [0 if condition == NOMINAL else drive.machine for drive in drives],
-            asked.endurance,
-            condition,
-        )
-        return watched(driver, asked.platform, lambda steps: tell(what, steps * len(drives) * TIME_STEP))
+            def report(steps: int, what: str = f"{label}, {condition}") -> None:
+                progress(what, steps * len(drives) * TIME_STEP)
+
+            machines = Machines(
+                drives=[drive.cues for drive in drives],
+                platforms=endurance.machines_under(condition, platform),
+                platform_of=[0 if condition == NOMINAL else drive.machine for drive in drives],
+            )
+            run = Rollout(self._policies[label], machines, finite=True)
+            results[condition], extremes[condition] = drive_and_check(run, platform, report)
+        self._stores[label].keep(_records(drives, results), extremes)
+        self._outcome.driven += len(drives)
 
 
-def _records(drives: Sequence[SeededDrive], outcomes: Mapping[str, Sequence[Endured]]) -> list[EnduredDrive]:
+def _records(drives: Sequence[SeededDrive], results: Mapping[str, Sequence[Endured]]) -> list[EnduredDrive]:
     return [
         EnduredDrive(
             name=drive.cues.name,
@@ -240,7 +237,7 @@ def _records(drives: Sequence[SeededDrive], outcomes: Mapping[str, Sequence[Endu
             car=drive.car,
             friction=drive.friction,
             machine=drive.machine,
-            conditions={condition: found[i] for condition, found in outcomes.items()},
+            conditions={condition: endured[i] for condition, endured in results.items()},
         )
         for i, drive in enumerate(drives)
     ]

@@ -1,4 +1,4 @@
-"""Frequency responses as tables, CSV and JSON."""
+"""Frequency responses as tables, CSV, JSON and Bode plots."""
 
 from __future__ import annotations
 
@@ -127,9 +127,6 @@ def load_json(path: str | Path) -> list[FrequencyResponse]:
         ConfigurationError: a field is missing, unknown or wrong.
     """
     return list(SavedResponses.load_json(path).responses)
-
-
-# Bode plots of frequency responses: each axis to itself, and every axis to every other.
 
 
 _TITLES: Final = {

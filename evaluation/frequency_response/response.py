@@ -1,4 +1,8 @@
-"""The inputs of the objective motion cueing test: one sinusoid on one axis of the car's motion."""
+"""Frequency response of a policy on its machine: the objective motion cueing test of ICAO 9625.
+
+Each axis of the car's motion moves alone, in sinusoids. The response of a simulator cue is its modulus and
+phase over the reference cue. A policy that is not linear has one response for each amplitude.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...baselines import ForeknowingPolicy, Policy
-from ...baselines.policy import start_of
+from ...baselines.interface import Machines
+from ...baselines.policy import Policy, as_policy
 from ...envs.cues import GRAVITY, CueTrace
 from ...envs.platform import Platform
 from ...envs.settings import NonNegative, Positive, configuration
-from ...envs.simulator.simulator import TIME_STEP, Simulator
-from ..metrics import CUE_AXES, cab_motion
-from ..rollout import AnyPolicy, Observer, TaskPolicy, rollout
+from ...envs.simulator.simulator import TIME_STEP
+from ..metrics import CUE_AXES
+from ..rollout import Rollout
 from ..trajectory import Floats
 
 OMCT_FREQUENCIES: Final = (
@@ -174,13 +178,6 @@ def harmonic(signal: Floats, frequency: float, dt: float) -> tuple[NDArray[np.co
     return fit[2] + 1j * fit[3], explained
 
 
-# The frequency response of a policy on its machine: the objective motion cueing test of ICAO 9625.
-#
-# Each axis of the car's motion is moved alone, in sinusoids; modulus and phase of what the driver feels, on
-# each axis, over what he should feel are the response. A policy that is not linear has one for each
-# amplitude.
-
-
 Complexes = NDArray[np.complex128]
 
 SILENCE: Final = 1e-6
@@ -245,7 +242,7 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    policy: AnyPolicy,
+    policy: Any,
     platform: Platform,
     test: FrequencyTest | None = None,
     axes: Sequence[str] = CUE_AXES,
@@ -254,22 +251,23 @@ def frequency_response(
     """Drive a policy with every sinusoid.
 
     Args:
-        policy: The policy; if it only has ``predict``, the axes of a frequency are driven as one batch.
+        policy: A policy, or any object with ``predict``.
         platform: The machine.
         test: Frequencies, amplitudes, durations.
         axes: To be moved, of :data:`~.metrics.CUE_AXES`.
         progress: Told each frequency before it is driven.
     """
-    test = test or FrequencyTest()
-    found: list[Sinusoid] = []
+    test, policy = test or FrequencyTest(), as_policy(policy).for_platform(platform)
+    sinusoids: list[Sinusoid] = []
     for frequency in test.frequencies:
         progress(frequency)
         probes = [probe(axis, frequency, test) for axis in axes]
-        for one, motion in zip(probes, _motions(policy, platform, probes), strict=True):
-            found.append(_sinusoid(one, motion, test.amplitude(one.axis, frequency)))
-    found.sort(key=lambda s: (CUE_AXES.index(s.input), s.frequency))
-    name = str(getattr(policy, "name", type(policy).__name__))
-    return FrequencyResponse(name, platform.name, test, tuple(found))
+        # A network rounds sums of a batch in another way, so agents are driven one axis at a time.
+        for batch in [probes] if policy.task is None else [[one] for one in probes]:
+            for one, motion in zip(batch, _motions(policy, platform, batch), strict=True):
+                sinusoids.append(_sinusoid(one, motion, test.amplitude(one.axis, frequency)))
+    sinusoids.sort(key=lambda s: (CUE_AXES.index(s.input), s.frequency))
+    return FrequencyResponse(policy.name, platform.name, test, tuple(sinusoids))
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,40 +298,19 @@ def _sinusoid(one: Probe, motion: _Motion, amplitude: float) -> Sinusoid:
     )
 
 
-def _motions(policy: AnyPolicy, platform: Platform, probes: Sequence[Probe]) -> Iterator[_Motion]:
-    """The motion in the window of each of some probes of one length."""
-    if isinstance(policy, ForeknowingPolicy | TaskPolicy):
-        for one in probes:
-            yield _single(policy, platform, one)
-        return
-    yield from _batch(policy, platform, probes)
-
-
-def _single(policy: AnyPolicy, platform: Platform, one: Probe) -> _Motion:
-    drive = rollout(policy, one.cues, platform)
-    reference, simulated = cab_motion(drive)
-    window = slice(-one.samples, None)
-    limited = np.any(drive.limits_active != 0, axis=1)
-    return _Motion(reference[window], simulated[window], limited[window], drive.dt)
-
-
-def _batch(policy: Policy, platform: Platform, probes: Sequence[Probe]) -> Iterator[_Motion]:
-    simulator = Simulator(platform, [one.cues for one in probes])
-    observe = Observer(simulator)
-    simulator.reset(start_of(policy))
-    steps, samples = len(probes[0].cues) - 1, probes[0].samples
-    motion = np.zeros((2, samples, len(probes), len(CUE_AXES)))
-    limited = np.zeros((samples, len(probes)), dtype=bool)
-    memory: Any = None
-    begins = np.ones(len(probes), dtype=bool)
-    for k in range(steps):
-        action, memory = policy.predict(observe(), memory, begins, deterministic=True)
-        state = simulator.step(action)
-        begins = np.zeros(len(probes), dtype=bool)
-        row = k - (steps - samples)
-        if row >= 0:
-            for i, cue in enumerate(("reference_cue", "simulator_cue")):
-                motion[i, row] = np.hstack([state[cue]["force"], state[cue]["rate"]])
-            limited[row] = state["limits"] != 0
-    for j in range(len(probes)):
-        yield _Motion(motion[0, :, j], motion[1, :, j], limited[:, j], simulator.dt)
+def _motions(policy: Policy, platform: Platform, probes: Sequence[Probe]) -> Iterator[_Motion]:
+    """The motion in the window of each of some probes of one length, driven side by side."""
+    run = Rollout(policy, Machines([one.cues for one in probes], [platform]))
+    samples, n = probes[0].samples, len(probes)
+    motion = np.zeros((2, samples, n, len(CUE_AXES)))
+    limited = np.zeros((samples, n), dtype=bool)
+    first = run.samples - 1 - samples
+    for k, _ in enumerate(run.steps()):
+        if k < first:
+            continue
+        state = run.simulator.state
+        for i, cue in enumerate(("reference_cue", "simulator_cue")):
+            motion[i, k - first] = np.hstack([state[cue]["force"], state[cue]["rate"]])
+        limited[k - first] = state["limits"] != 0
+    for j in range(n):
+        yield _Motion(motion[0, :, j], motion[1, :, j], limited[:, j], run.simulator.dt)

@@ -1,30 +1,34 @@
-"""Noise on what a policy sees of the cues: sensors in the car and in the cab that are not perfect."""
+"""Robustness: policies under what they were not made for.
+
+The disturbances are slower actuators, dead time, noisy sensors, another car, and drives with larger
+accelerations, each alone.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from types import MappingProxyType
 from typing import Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from ...baselines import ForeknowingPolicy, Policy
+from ...baselines.interface import Interface, Machines
+from ...baselines.policy import Policy, Wrapper, as_policy
 from ...envs.car import Car
 from ...envs.cues import GRAVITY, CueTrace
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from ...envs.platform.kernels import ActuatorDynamics
 from ...envs.settings import NonNegative, Positive, configuration, to_dict
-from ...envs.simulator.kernels.observation import SCALES, SLICES
+from ...envs.simulator.kernels.observation import SCALES
 from ...envs.task.observation import ADDED
-from ..rollout import AnyPolicy, TaskPolicy, Wrapped
+from ..policies import make_policy
 from ..suite import CueSource
-from .study import Condition, moved_to, policy_on
+from .study import Condition
 
 Array = NDArray[Any]
 
@@ -53,93 +57,70 @@ class SensorNoise:
     seed: int = 0
 
 
-def with_noise(policy: AnyPolicy, noise: SensorNoise) -> AnyPolicy:
-    """The policy behind noisy sensors. What it is told of the drive ahead stays true."""
-    if isinstance(policy, ForeknowingPolicy):
-        return _ForeknowingBehind(policy, noise)
-    return _TaskBehind(policy, noise) if isinstance(policy, TaskPolicy) else _Behind(policy, noise)
+class NoisySensors(Wrapper):
+    """The policy behind noisy sensors; what it knows of the drive ahead stays true.
 
-
-class _Behind(Wrapped):
-    """A policy that sees noisy observations.
-
-    Its state is the policy's own in a tuple, so that it is never None but at the beginning, not even where
-    the policy has none.
+    The noise begins anew in every drive, the same for every policy.
 
     Args:
-        policy: What is behind the sensors.
+        policy: A policy, or any object with ``predict``.
         noise: Of the sensors.
     """
 
-    errors: Mapping[str, slice] = MappingProxyType({})
-    """Where the observation has the difference of cues wanted and felt, by name."""
-    in_cab: float = 1.0
-    """Share of the noise that the cab's cues get: 0 where a model tells them, not sensors."""
+    def __init__(self, policy: Any, noise: SensorNoise) -> None:
+        super().__init__(as_policy(policy))
+        self._noise = noise
 
-    def __init__(self, policy: Policy | TaskPolicy, noise: SensorNoise) -> None:
-        super().__init__(policy)
-        self._policy, self._noise = policy, noise
+    def connect(self, machines: Machines) -> Interface:
+        """The policy's interface with noise on its observations."""
+        return _NoisyInterface(self.inner.connect(machines), self._noise)
+
+
+class _NoisyInterface(Interface):
+    """White noise on the newest observation of an interface, nothing else.
+
+    Differences of cues get the difference of their noise. Rows of simulator cues that a model gives, not
+    sensors, get none.
+
+    Args:
+        inner: The interface.
+        noise: Of the sensors.
+    """
+
+    def __init__(self, inner: Interface, noise: SensorNoise) -> None:
+        self._inner, self._noise = inner, noise
+        self.simulator, self.action_size = inner.simulator, inner.action_size
+        self.steps_per_action, self.slices = inner.steps_per_action, inner.slices
         self._draw = np.random.default_rng(noise.seed)
 
-    def predict(
-        self,
-        observation: Array,
-        state: tuple[Any] | None = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
-    ) -> tuple[Array, tuple[Any]]:
-        """The answer to the observation with noise on it.
+    @property
+    def requested(self) -> Array:  # type: ignore[override]
+        return self._inner.requested
 
-        The noise begins anew, for all rows, where ``episode_start`` says of any that a drive begins; where it
-        is None, where ``state`` is.
-        """
-        if state is None if episode_start is None else np.any(episode_start):
-            self._draw = np.random.default_rng(self._noise.seed)
-        inner = None if state is None else state[0]
-        action, memory = self._policy.predict(self._noisy(observation), inner, episode_start, deterministic)
-        return action, (memory,)
+    def begin(self, start: ArrayLike | None) -> None:
+        self._draw = np.random.default_rng(self._noise.seed)
+        self._inner.begin(start)
 
-    def _noisy(self, observation: Array) -> Array:
-        seen = np.array(observation)
-        shape = (*seen.shape[:-1], 3)
+    def observe(self) -> Array:
+        """(n, size) observations with new noise."""
+        seen = np.array(self._inner.observe())
+        shape = (len(seen), 3)
         for (reference, simulated, error), size in zip(
             _KINDS, (self._noise.force, self._noise.rate), strict=True
         ):
             in_car, in_cab = self._draw.normal(scale=size, size=(2, *shape))
-            in_cab *= self.in_cab
-            seen[..., SLICES[reference]] += in_car / SCALES[reference]
-            seen[..., SLICES[simulated]] += in_cab / SCALES[simulated]
-            if error in self.errors:
-                seen[..., self.errors[error]] += (in_car - in_cab) / _ERRORS[error]
+            in_cab *= float(self._inner.simulator_cue_measured)
+            seen[:, self.slices[reference]] += in_car / SCALES[reference]
+            seen[:, self.slices[simulated]] += in_cab / SCALES[simulated]
+            if error in self.slices:
+                seen[:, self.slices[error]] += (in_car - in_cab) / _ERRORS[error]
         return seen
 
+    def act(self, action: Array) -> Iterator[None]:
+        return self._inner.act(action)
 
-class _TaskBehind(_Behind):
-    """The same for a policy with an environment of its own; only the newest frame of a stack is noisy."""
-
-    def __init__(self, policy: TaskPolicy, noise: SensorNoise) -> None:
-        super().__init__(policy, noise)
-        self.task = policy.task
-        self.in_cab = float(policy.task.observation.simulator_cue == "machine")
-        self.base_policy = getattr(policy, "base_policy", None)
-        layout = getattr(policy, "layout", None)
-        self.errors = {} if layout is None else {name: layout.slices[name] for name in _ERRORS}
-
-
-class _ForeknowingBehind(Wrapped):
-    """The same for a policy that is told the drive."""
-
-    def __init__(self, policy: ForeknowingPolicy, noise: SensorNoise) -> None:
-        super().__init__(policy)
-        self._told: Callable[[CueTrace], Policy] = policy.for_drive
-        self._noise = noise
-
-    def for_drive(self, cues: CueTrace) -> Policy:
-        """The policy for one drive."""
-        return _Behind(self._told(cues), self._noise)
-
-
-# What a controller was not made for: slower actuators, delay, noise, another car, fiercer drives.
+    def follow(self, leader: Any) -> Callable[[], None]:
+        return self._inner.follow(leader)
 
 
 NOMINAL = "nominal"
@@ -155,7 +136,7 @@ class Disturbances:
             motion by 2 / lag.
         dead_time: Of the actuators, s.
         noise: Of the sensors.
-        time_scaling: Factor on all accelerations of the drives; see :func:`fiercer`.
+        time_scaling: Factor on all accelerations of the drives; see :func:`time_scaled`.
     """
 
     lag: Positive = 30.0
@@ -164,7 +145,7 @@ class Disturbances:
     time_scaling: Annotated[float, Field(ge=1.0, le=4.0)] = 2.0
 
 
-def fiercer(cues: CueTrace, factor: float) -> CueTrace:
+def time_scaled(cues: CueTrace, factor: float) -> CueTrace:
     """The same way driven sqrt(factor) times as fast.
 
     Along a given path all accelerations grow with the square of the speed, forward ones as well, and yaw
@@ -211,7 +192,7 @@ class Study:
         other: Another car.
         maneuvers: The maneuvers of a car.
         disturbances: Sizes.
-        causal: Names or files of policies that are left out if they are told the drive beforehand.
+        causal: Names or files of policies that are skipped if they must know the drive beforehand.
     """
 
     platform: Platform
@@ -241,7 +222,7 @@ class Study:
                 car=self.other,
                 maneuvers=self.maneuvers(self.other),
             ),
-            self._fierce(),
+            self._time_scaled(),
         ]
 
     @cached_property
@@ -250,39 +231,42 @@ class Study:
         about = "as the controllers were made for"
         return Condition(NOMINAL, about, self.platform, self.car, own, self._made)
 
-    def _made(self, name: str) -> AnyPolicy:
-        policy = policy_on(name, self.platform)
-        if name in self.causal and isinstance(policy, ForeknowingPolicy):
+    def _made(self, given: Any) -> Policy:
+        policy = make_policy(given, self.platform, force=True)
+        if policy.needs_drive and given in self.causal:
             raise ConfigurationError(
-                f"{name} is told the drive before it begins; give --policies {name} to see it all the same"
+                f"{given} is told the drive before it begins; give --policies {given} to see it all the same"
             )
         return policy
 
     def _slower(self, name: str, description: str, dynamics: ActuatorDynamics) -> Condition:
         driven = with_dynamics(self.platform, dynamics)
 
-        def make(policy: str) -> AnyPolicy:
-            return moved_to(self._made(policy), driven)
+        def make(given: Any) -> Policy:
+            return self._made(given).on(driven)
 
         return replace(self._nominal, name=name, description=description, platform=driven, make=make)
 
     def _noisy(self) -> Condition:
         noise = self.disturbances.noise
 
-        def make(policy: str) -> AnyPolicy:
-            return with_noise(self._made(policy), noise)
+        def make(given: Any) -> Policy:
+            return NoisySensors(self._made(given), noise)
 
         sizes = f"{noise.force:g} m/s² and {math.degrees(noise.rate):.2g} deg/s"
         about = {"noise": {"version": NOISE_VERSION, **to_dict(noise)}}
         description = f"white noise of {sizes} on the cues seen"
         return replace(self._nominal, name="noise", description=description, make=make, about=about)
 
-    def _fierce(self) -> Condition:
+    def _time_scaled(self) -> Condition:
         factor = self.disturbances.time_scaling
-        drives = {name: partial(_fiercer, source, factor) for name, source in self._nominal.maneuvers.items()}
+        drives = {
+            name: partial(_time_scaled_source, source, factor)
+            for name, source in self._nominal.maneuvers.items()
+        }
         description = f"the same ways {math.sqrt(factor):.2f} times as fast, with {factor:g} times the forces"
-        return replace(self._nominal, name="fierce", description=description, maneuvers=drives)
+        return replace(self._nominal, name="time scaling", description=description, maneuvers=drives)
 
 
-def _fiercer(source: CueSource, factor: float) -> CueTrace:
-    return fiercer(source(), factor)
+def _time_scaled_source(source: CueSource, factor: float) -> CueTrace:
+    return time_scaled(source(), factor)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from ...baselines.policy import Policy
 from ...envs.car import Car
 from ...envs.cues import CueTrace
 from ...envs.errors import DataError
@@ -129,14 +130,20 @@ def _readable(path: Path) -> bool:
     return True
 
 
-def identity(name: str, policy: Any) -> dict[str, Any]:
-    """What a policy is, as plain values: its name or the content of its file, and its parameters."""
-    path = Path(name)
-    parameters = getattr(policy, "parameters", None)
+def identity(given: Any, policy: Policy) -> dict[str, Any]:
+    """What a policy is, as plain values: its name or the content of its file, and its parameters.
+
+    Args:
+        given: Its name or file, or the policy itself.
+        policy: The policy.
+    """
+    name = given if isinstance(given, str) else policy.name
+    # Of a class in a file, `file.py:Class`, the file.
+    path = Path(name.rpartition(".py:")[0] + ".py" if ".py:" in name else name)
     return {
         "name": name,
         "file": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
-        "parameters": None if parameters is None else to_dict(parameters),
+        "parameters": None if policy.parameters is None else to_dict(policy.parameters),
     }
 
 

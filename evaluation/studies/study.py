@@ -1,62 +1,25 @@
-"""Policies on machines that they were not made for, as studies of machines need them."""
+"""Studies: policies under several conditions, such as machines or disturbances, in the same drives.
+
+A finished drive is kept, so that a study that was interrupted, or is extended, goes on where it was.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...baselines.washout import make_washout
+from ...baselines.policy import Policy
 from ...envs.car import Car
 from ...envs.cues import CueTrace
 from ...envs.errors import MotionCueingError
 from ...envs.platform import Platform
 from ..metrics import Metrics, measure
-from ..policies import find_agent, is_agent, make_policy
-from ..rollout import AnyPolicy, TaskPolicy, notes_of, rollout
+from ..rollout import rollout, statistics_of
 from ..suite import CueSource, explain
 from .results import StudyFailure
 from .store import KeptDrive, PairStore, drive_key, identity
-
-
-def policy_on(name: str, platform: Platform) -> AnyPolicy:
-    """A policy by name or file on any machine.
-
-    An agent is forced onto the machine, whatever it was trained on; what is not there does not answer.
-    A washout on a machine without turntable yaws the cab with its hexapod (k_T = 0), as the paper's EST3.
-    Any other policy is made for the machine.
-
-    Args:
-        name: Of the policy, or its file.
-        platform: The machine.
-
-    Raises:
-        MotionCueingError: there is no such policy, or it cannot be made for the machine.
-    """
-    if is_agent(name):
-        return find_agent(name).on(platform)
-    policy: Any = make_policy(name, platform)
-    parameters: Any = getattr(policy, "parameters", None)
-    if platform.turntable is None and getattr(parameters, "turntable_share", 0.0) > 0.0:
-        return make_washout(replace(parameters, turntable_share=0.0), platform.cab)
-    return policy  # type: ignore[no-any-return]
-
-
-def moved_to(policy: AnyPolicy, platform: Platform) -> AnyPolicy:
-    """The policy of a machine, to be driven on another one that it knows nothing of.
-
-    Args:
-        policy: Made for a machine with the same subsystems.
-        platform: The one it is driven on.
-    """
-    on = getattr(policy, "on", None)
-    return on(platform) if isinstance(policy, TaskPolicy) and callable(on) else policy
-
-
-# Policies under several conditions, such as machines or disturbances: every pair drives the same maneuvers.
-#
-# A drive that is done is kept, so that a study that was interrupted, or is extended, goes on where it was.
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +32,8 @@ class Condition:
         platform: The machine that is driven.
         car: That is driven.
         maneuvers: Sources of cues by name.
-        make: The policy of a name or file, for this condition; a MotionCueingError leaves it out.
+        make: The policy for this condition, of a name or file or a policy itself; a MotionCueingError skips
+            it.
         about: What else makes a drive what it is, as plain values: a drive that is kept is of the same.
     """
 
@@ -78,47 +42,27 @@ class Condition:
     platform: Platform
     car: Car
     maneuvers: Mapping[str, CueSource]
-    make: Callable[[str], AnyPolicy]
+    make: Callable[[Any], Policy]
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
 class StudyOutcome:
-    """What a study found.
+    """The result of a study.
 
     Args:
         metrics: By condition, policy and maneuver.
-        left_out: By condition and policy: why it is not driven there.
+        skipped: By condition and policy: why it is not driven there.
         failures: Drives that gave no result.
-        notes: What policies counted, by condition, policy and maneuver, where they did.
+        statistics: What policies counted, by condition, policy and maneuver, where they did.
         driven: Number of drives that were driven now; the others were kept.
     """
 
     metrics: dict[str, dict[str, dict[str, Metrics]]] = field(default_factory=dict)
-    left_out: dict[str, dict[str, str]] = field(default_factory=dict)
+    skipped: dict[str, dict[str, str]] = field(default_factory=dict)
     failures: list[StudyFailure] = field(default_factory=list)
-    notes: dict[str, dict[str, dict[str, dict[str, str]]]] = field(default_factory=dict)
+    statistics: dict[str, dict[str, dict[str, dict[str, str]]]] = field(default_factory=dict)
     driven: int = 0
-
-
-def run_study(
-    conditions: list[Condition],
-    policies: Mapping[str, str],
-    folder: Path,
-    progress: Callable[[str, str], None] = lambda what, who: None,
-) -> StudyOutcome:
-    """Drive every policy under every condition, unless a drive is kept already.
-
-    Args:
-        conditions: Parts of the study.
-        policies: Name or file by label.
-        folder: Where drives are kept, one file a condition and policy.
-        progress: Told before each drive.
-    """
-    study = _Running(folder, progress)
-    for condition in conditions:
-        study.drive(condition, policies)
-    return study.outcome
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,81 +71,93 @@ class _Pair:
 
     condition: Condition
     label: str
-    policy: AnyPolicy
-    who: Mapping[str, Any]
+    policy: Policy
+    identity: Mapping[str, Any]
     store: PairStore
 
-    def key(self, cues: CueTrace) -> str:
-        condition = self.condition
-        return drive_key(condition.platform, condition.car, condition.about, self.who, cues)
 
-    def driven(self, key: str, cues: CueTrace) -> KeptDrive:
-        drive = rollout(self.policy, cues, self.condition.platform, self.condition.car)
-        return KeptDrive(key, measure(drive), notes_of(drive.metadata))
-
-
-class _Running:
-    """A study under way: what it found so far."""
+class _Study:
+    """A study under way: drives pairs, and collects the outcome."""
 
     def __init__(self, folder: Path, progress: Callable[[str, str], None]) -> None:
         self.outcome = StudyOutcome()
         self._folder, self._progress = folder, progress
 
-    def drive(self, condition: Condition, policies: Mapping[str, str]) -> None:
+    def drive(self, condition: Condition, policies: Mapping[str, Any]) -> None:
         """Every policy under a condition."""
         cues = self._cues(condition)
         metrics = self.outcome.metrics[condition.name] = {}
-        left_out = self.outcome.left_out[condition.name] = {}
-        for label, name in policies.items():
+        skipped = self.outcome.skipped[condition.name] = {}
+        for label, given in policies.items():
             try:
-                policy = condition.make(name)
+                policy = condition.make(given)
             except MotionCueingError as error:
-                left_out[label] = str(error)
+                skipped[label] = str(error)
                 for _ in condition.maneuvers:
                     self._progress(condition.name, label)
                 continue
             store = PairStore(self._folder, condition.name, label)
-            metrics[label] = self._drives(
-                _Pair(condition, label, policy, identity(name, policy), store), cues
-            )
+            pair = _Pair(condition, label, policy, identity(given, policy), store)
+            metrics[label] = self._drive_pair(pair, cues)
 
     def _cues(self, condition: Condition) -> dict[str, CueTrace]:
-        found: dict[str, CueTrace] = {}
+        cues: dict[str, CueTrace] = {}
         for maneuver, source in condition.maneuvers.items():
             try:
-                found[maneuver] = source()
+                cues[maneuver] = source()
             except Exception as error:
                 self.outcome.failures.append(StudyFailure(condition.name, None, maneuver, explain(error)))
-        return found
+        return cues
 
-    def _drives(self, pair: _Pair, cues: Mapping[str, CueTrace]) -> dict[str, Metrics]:
+    def _drive_pair(self, pair: _Pair, cues: Mapping[str, CueTrace]) -> dict[str, Metrics]:
         """Metrics by maneuver."""
-        name, label = pair.condition.name, pair.label
-        found: dict[str, Metrics] = {}
+        condition, label = pair.condition.name, pair.label
+        metrics: dict[str, Metrics] = {}
         for maneuver in pair.condition.maneuvers:
-            self._progress(f"{name}, {maneuver}", label)
-            kept = self._kept(pair, maneuver, cues[maneuver]) if maneuver in cues else None
-            if kept is None:
+            self._progress(f"{condition}, {maneuver}", label)
+            if maneuver not in cues:
                 continue
-            found[maneuver] = kept.metrics
+            # A policy is a user's code: whatever it raises must not cost the other drives.
+            try:
+                kept = self._drive(pair, maneuver, cues[maneuver])
+            except Exception as error:
+                self.outcome.failures.append(StudyFailure(condition, label, maneuver, explain(error)))
+                continue
+            metrics[maneuver] = kept.metrics
             if kept.notes:
-                self.outcome.notes.setdefault(name, {}).setdefault(label, {})[maneuver] = kept.notes
-        return found
+                by_policy = self.outcome.statistics.setdefault(condition, {})
+                by_policy.setdefault(label, {})[maneuver] = kept.notes
+        return metrics
 
-    def _kept(self, pair: _Pair, maneuver: str, cues: CueTrace) -> KeptDrive | None:
-        """A drive that is kept, or is now; None where it fails."""
-        key = pair.key(cues)
+    def _drive(self, pair: _Pair, maneuver: str, cues: CueTrace) -> KeptDrive:
+        """A drive that is kept, or is driven now."""
+        condition = pair.condition
+        key = drive_key(condition.platform, condition.car, condition.about, pair.identity, cues)
         kept = pair.store.find(maneuver, key)
         if kept is not None:
             return kept
-        # A policy is a user's code: whatever it raises must not cost the other drives.
-        try:
-            kept = pair.driven(key, cues)
-        except Exception as error:
-            self.outcome.failures.append(
-                StudyFailure(pair.condition.name, pair.label, maneuver, explain(error))
-            )
-            return None
+        drive = rollout(pair.policy, cues, condition.platform, condition.car)
+        kept = KeptDrive(key, measure(drive), statistics_of(drive.metadata))
         pair.store.keep(maneuver, kept)
         self.outcome.driven += 1
         return kept
+
+
+def run_study(
+    conditions: list[Condition],
+    policies: Mapping[str, Any],
+    folder: Path,
+    progress: Callable[[str, str], None] = lambda what, who: None,
+) -> StudyOutcome:
+    """Drive every policy under every condition, unless a drive is kept already.
+
+    Args:
+        conditions: Parts of the study.
+        policies: By label: a name or file, or a policy itself.
+        folder: Where drives are kept, one file a condition and policy.
+        progress: Called before each drive.
+    """
+    study = _Study(folder, progress)
+    for condition in conditions:
+        study.drive(condition, policies)
+    return study.outcome

@@ -32,3 +32,8 @@ def boundless() -> Platform:
         hexapod=replace(paper.hexapod, velocity=50.0, acceleration=500.0),
         turntable=Turntable(travel=None, velocity=50.0, acceleration=500.0),
     )
+
+
+def weave(t):
+    ramp = np.clip((t - 0.5) / 2.0, 0.0, 1.0)
+    return ramp[:, None] * np.column_stack([1.5 * np.sin(0.9 * t), 2.0 * np.sin(1.3 * t)])

@@ -13,10 +13,9 @@ from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownName
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import Trajectory, policies, rollout
-from motion_cueing.train.agents import agent as shipped
 
 from ..envs.task.tasks import drive
-from ..train.agents import agent
+from ..train.agents import agent, ship
 
 PAPER = get_platform("paper")
 
@@ -24,9 +23,9 @@ PAPER = get_platform("paper")
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A package with the agents `near` and, for another machine, `far`."""
-    monkeypatch.setattr(shipped, "FOLDER", tmp_path)
     agent(name="near").save(tmp_path / "near.safetensors")
     agent(TaskOptions(platform="24-inch"), name="far").save(tmp_path / "far.safetensors")
+    ship(tmp_path, monkeypatch)
     return tmp_path
 
 

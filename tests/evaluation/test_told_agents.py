@@ -10,12 +10,10 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import ablation_names, get_platform, platform_names
 from motion_cueing.envs.task import DrivingSimulator, TaskOptions
 from motion_cueing.evaluation import policies, rollout
-from motion_cueing.evaluation.rollout import on_machine
 from motion_cueing.realtime.machine import make_machine
-from motion_cueing.train.agents import agent as shipped
 
 from ..envs.task.tasks import drive
-from ..train.agents import agent
+from ..train.agents import agent, ship
 
 TOLD = TaskOptions(observation={"machine": True, "frame": "cab"}, action={"frame": "cab", "authority": 0.1})
 
@@ -24,7 +22,7 @@ TOLD = TaskOptions(observation={"machine": True, "frame": "cab"}, action={"frame
 def test_it_drives_any_machine_as_in_an_environment_of_it(name):
     one, platform = agent(TOLD), get_platform(name)
     found = rollout(one, drive(samples=51), platform)
-    env = DrivingSimulator(on_machine(one, platform).task, drives=[drive(samples=51)])
+    env = DrivingSimulator(one.for_platform(platform).task, drives=[drive(samples=51)])
     observation, _ = env.reset(seed=0)
     asked = []
     for _ in range(50):
@@ -42,9 +40,9 @@ def test_what_it_does_depends_on_what_it_is_told():
 
 
 def test_by_name_it_is_made_for_the_machine_at_hand(tmp_path, monkeypatch):
-    monkeypatch.setattr(shipped, "FOLDER", tmp_path)
     agent(TOLD, name="any").save(tmp_path / "any.safetensors")
     agent(name="one").save(tmp_path / "one.safetensors")
+    ship(tmp_path, monkeypatch)
     for name in [*platform_names(), *ablation_names()]:
         platform = get_platform(name)
         assert policies.make_policy("any", platform).platform == platform

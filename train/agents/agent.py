@@ -1,30 +1,36 @@
-"""A trained policy with everything an evaluation needs: network, task, base policy, and how it was made."""
+"""Agents: trained policies with everything an evaluation needs, in one file each.
+
+An agent is a :class:`~motion_cueing.baselines.policy.TaskPolicy`: it sees the observations of the environment
+it was trained in, and acts there.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...baselines import ClassicalWashout
-from ...baselines.washout import ScheduledWashout, WashoutParameters, load_washout
+from ...baselines.policy import TaskPolicy
+from ...baselines.washout import ClassicalWashout, WashoutParameters, load_washout
 from ...baselines.washout.classical.scheduled import KNOBS
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
 from ...envs.platform.kernels.step import AXES
 from ...envs.platform.machines import Platform
-from ...envs.task.drives import platform_of
 from ...envs.task.observation import Layout, layout_of
 from ...envs.task.options import TaskOptions
-from .files import SUFFIX, Record, contents_of, network_of, read, write
+from . import names
+from .base_policy import base_policy as make_base
+from .files import Record, contents_of, network_of, read, write
+from .names import SUFFIX, description_of
 from .network import Array, Network
 
 
 @dataclass(frozen=True, eq=False)
-class Agent:
+class Agent(TaskPolicy):
     """A policy for the environment of its ``task``.
 
     Args:
@@ -39,10 +45,10 @@ class Agent:
         ConfigurationError: the action mode needs a base, or has no use for one.
     """
 
-    name: str
-    task: TaskOptions
-    network: Network
-    record: Record
+    name: str = field()
+    task: TaskOptions = field()
+    network: Network = field()
+    record: Record = field()
     base: WashoutParameters | str | Path | None = None
 
     def __post_init__(self) -> None:
@@ -65,16 +71,6 @@ class Agent:
             )
 
     @property
-    def platform(self) -> Platform:
-        """The machine it was trained on."""
-        return platform_of(self.task)
-
-    @property
-    def told(self) -> bool:
-        """Whether it is told its machine, and so runs on any."""
-        return self.task.observation.machine
-
-    @property
     def action_size(self) -> int:
         """Entries of an action."""
         return len(KNOBS) if self.task.action.mode == "gains" else len(AXES)
@@ -92,16 +88,14 @@ class Agent:
     @property
     def description(self) -> str:
         """One line for people."""
-        base = "any motion base, which it is told" if self.told else f"the motion base {self.platform.name}"
-        return f"agent by {self.record.algo} for {base}, action {self.task.action.mode}"
+        return description_of(
+            self.record.algo, self.task.observation.machine, self.platform.name, self.task.action.mode
+        )
 
     @cached_property
     def base_policy(self) -> ClassicalWashout | None:
         """The washout that the environment needs as ``base``, or None."""
-        if not isinstance(self.base, WashoutParameters):
-            return None
-        kind = ScheduledWashout if self.task.action.mode == "gains" else ClassicalWashout
-        return kind(self.base, self.platform.cab)
+        return None if self.base is None else make_base(self.base, self.task)
 
     def predict(
         self,
@@ -123,7 +117,10 @@ class Agent:
         return self.network(values), state
 
     def on(self, platform: Platform | str) -> Agent:
-        """The same agent on another machine than it was trained on: no fair test of it, unless it is told."""
+        """The same agent on another machine than it was trained on.
+
+        That is no fair test of it, unless its observation describes the machine.
+        """
         return replace(self, task=replace(self.task, platform=platform))
 
     def save(self, path: str | Path) -> None:
@@ -151,17 +148,6 @@ class Agent:
         return cls(contents.name, contents.task, network, contents.record, contents.base)
 
 
-# The agents that come with the package.
-
-
-FOLDER: Final = Path(__file__).parent
-
-
-def agent_names() -> list[str]:
-    """Names of the shipped agents."""
-    return sorted(path.stem for path in FOLDER.glob(f"*{SUFFIX}"))
-
-
 def get_agent(name: str) -> Agent:
     """A shipped agent.
 
@@ -169,9 +155,20 @@ def get_agent(name: str) -> Agent:
         UnknownNameError: no agent has this name.
         DataError: there is none at all.
     """
-    known = agent_names()
+    known = names.agent_names()
     if not known:
         raise DataError(f"agent {name!r}: no agent comes with this package; name an agent's {SUFFIX} file")
     if name not in known:
         raise UnknownNameError("agent", name, known)
-    return Agent.load(FOLDER / f"{name}{SUFFIX}")
+    return Agent.load(names.FOLDER / f"{name}{SUFFIX}")
+
+
+def find_agent(name: str) -> Agent:
+    """An agent by the name of a shipped one, or from its file.
+
+    Raises:
+        UnknownNameError: no agent has this name.
+        DataError: the file does not exist, is broken or no agent.
+    """
+    is_file = bool(Path(name).suffix) or len(Path(name).parts) > 1 or Path(name).exists()
+    return Agent.load(name) if is_file and name not in names.agent_names() else get_agent(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Final
 
 from ...baselines.washout import ClassicalWashout, ScheduledWashout, WashoutParameters, load_washout
@@ -13,7 +14,9 @@ DEFAULT: Final = "classical"
 """The washout where one is needed and none is named."""
 
 
-def base_parameters(base: WashoutParameters | str | None, task: TaskOptions) -> WashoutParameters | None:
+def base_parameters(
+    base: WashoutParameters | str | Path | None, task: TaskOptions
+) -> WashoutParameters | None:
     """The washout that a task's action mode needs under the agent, or None.
 
     Args:
@@ -32,7 +35,7 @@ def base_parameters(base: WashoutParameters | str | None, task: TaskOptions) -> 
     return base if isinstance(base, WashoutParameters) else load_washout(base or DEFAULT)
 
 
-def base_policy(base: WashoutParameters | str | None, task: TaskOptions) -> Any:
+def base_policy(base: WashoutParameters | str | Path | None, task: TaskOptions) -> Any:
     """The policy of :func:`base_parameters`, as the environment takes it, or None."""
     parameters = base_parameters(base, task)
     if parameters is None:

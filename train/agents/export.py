@@ -139,7 +139,7 @@ def metadata(agent: Agent) -> dict[str, str]:
 
 def abilities_of(agent: Agent) -> dict[str, list[float]]:
     """What an agent that is told its machine sees of it, in SI units; nothing for any other."""
-    if not agent.told:
+    if not agent.task.observation.machine:
         return {}
     return {name: values.tolist() for name, values in abilities(agent.platform).items()}
 

@@ -24,6 +24,7 @@ from ...envs.settings import NonNegative, Positive, configuration, from_dict, to
 from ...envs.storage import write_bytes
 from ...envs.task.drives import platform_of
 from ...envs.task.options import TaskOptions
+from .names import LENGTH, METADATA
 from .network import Activation, Network, Squash
 
 
@@ -167,14 +168,11 @@ def _bias(k: int) -> str:
     return f"layers.{k}.bias"
 
 
-SUFFIX: Final = ".safetensors"
+# An agent's file: safetensors with one entry of metadata, JSON with version and checksum.
+
 
 FORMAT: Final = 1
 """Version of the file; a reader refuses newer ones."""
-
-_KEY: Final = "motion-cueing-agent"
-_LENGTH: Final = 8
-"""Bytes of the header's length, before the header, which begins with a brace."""
 
 
 def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], values: Mapping[str, Any]) -> None:
@@ -182,7 +180,7 @@ def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], values: Mapping[
     about = {"format": FORMAT, "sha256": checksum(arrays, values), "contents": values}
     plain = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     # One entry: the library writes several in an order that changes.
-    write_bytes(path, save(plain, metadata={_KEY: json.dumps(about, sort_keys=True)}))
+    write_bytes(path, save(plain, metadata={METADATA: json.dumps(about, sort_keys=True)}))
 
 
 def read(path: str | Path) -> tuple[dict[str, NDArray[Any]], Any]:
@@ -216,20 +214,20 @@ def checksum(arrays: Mapping[str, NDArray[Any]], values: Mapping[str, Any]) -> s
 def _check_kind(path: str | Path) -> None:
     try:
         with open(path, "rb") as file:
-            head = file.read(_LENGTH + 1)
+            head = file.read(LENGTH + 1)
     except FileNotFoundError:
         raise DataError(f"agent {path}: there is no such file") from None
     except OSError as error:
         raise DataError(f"agent {path}: cannot be read ({error.strerror})") from None
-    if head[_LENGTH:] != b"{":
+    if head[LENGTH:] != b"{":
         raise _foreign(path)
 
 
 def _about(path: str | Path, metadata: Mapping[str, str] | None) -> dict[str, Any]:
-    if not metadata or _KEY not in metadata:
+    if not metadata or METADATA not in metadata:
         raise _foreign(path)
     try:
-        about = json.loads(metadata[_KEY])
+        about = json.loads(metadata[METADATA])
         version = int(about["format"])
     except (ValueError, KeyError, TypeError):
         raise DataError(f"{path}: damaged, its description is no JSON; copy or download it again") from None

@@ -15,6 +15,7 @@ from ....envs.errors import UnknownNameError
 from ....envs.platform.machines import Platform
 from ....envs.settings import configuration
 from ....envs.simulator.simulator import TIME_STEP
+from ...policy import WHOLE_DRIVE, Policy
 from ...presets import preset_names
 from .family import ClassicalWashout, WashoutParameters, load_washout
 
@@ -49,7 +50,7 @@ def load_per_maneuver(maneuver: str) -> WashoutParameters:
     return load_washout(_SETS / f"{maneuver}.yaml")
 
 
-class PerManeuverWashout:
+class PerManeuverWashout(Policy):
     """The classical washout with the best parameter set for the maneuver at hand.
 
     Without a turntable it yaws the cab with the hexapod (k_T = 0), as the paper's EST3: the sets are tuned on
@@ -61,15 +62,17 @@ class PerManeuverWashout:
     """
 
     name = PER_MANEUVER
+    information = WHOLE_DRIVE
 
     def __init__(self, platform: Platform, dt: float = TIME_STEP) -> None:
-        self.platform, self.dt = platform, dt
+        self.platform: Platform = platform
+        self.time_step: float = dt
         sets = {name: load_per_maneuver(name) for name in tuned_maneuvers()}
         if platform.turntable is None:
             sets = {name: replace(tuned, turntable_share=0.0) for name, tuned in sets.items()}
-        self.parameters = PerManeuverParameters(sets)
+        self.parameters: PerManeuverParameters = PerManeuverParameters(sets)
 
-    def for_drive(self, cues: CueTrace) -> ClassicalWashout:
+    def for_drive(self, cues: CueTrace) -> Policy:
         """The washout for a maneuver, by the name of its cues.
 
         Raises:
@@ -78,4 +81,4 @@ class PerManeuverWashout:
         sets = self.parameters.sets
         if cues.name not in sets:
             raise UnknownNameError(f"maneuver of {PER_MANEUVER}", cues.name, sets)
-        return ClassicalWashout(replace(sets[cues.name], name=self.name), self.platform.cab, self.dt)
+        return ClassicalWashout(replace(sets[cues.name], name=self.name), self.platform.cab, self.time_step)

@@ -58,7 +58,7 @@ class ScheduledWashout(ClassicalWashout):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made anew: Warp's arrays cannot be."""
-        return type(self), (self.parameters, self.cab, self.dt, self.span)
+        return type(self), (self.parameters, self.cab, self.time_step, self.span)
 
     @property
     def gain_names(self) -> tuple[str, ...]:

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from motion_cueing.baselines.interface import Observer
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.platform import Platform
 from motion_cueing.envs.simulator.simulator import Simulator
-from motion_cueing.evaluation.rollout import Observer
 
 
 def memories(

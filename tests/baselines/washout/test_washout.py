@@ -31,15 +31,10 @@ from motion_cueing.envs.settings import load, save, to_dict
 from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.evaluation import rollout
 
-from ..drives import DT, boundless, trace
+from ..drives import DT, boundless, trace, weave
 
 PAPER = get_platform("paper")
 OPEN = (HighPass(), HighPass(), HighPass())
-
-
-def weave(t):
-    ramp = np.clip((t - 0.5) / 2.0, 0.0, 1.0)
-    return ramp[:, None] * np.column_stack([1.5 * np.sin(0.9 * t), 2.0 * np.sin(1.3 * t)])
 
 
 def yawing(t):

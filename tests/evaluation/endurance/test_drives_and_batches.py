@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import make_policy
+from motion_cueing.baselines.interface import Machines
 from motion_cueing.envs.car import car_names, get_car
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
@@ -17,12 +18,12 @@ from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
-from motion_cueing.evaluation.endurance.batch_drivers import batch_driver
-from motion_cueing.evaluation.endurance.checks import watched
+from motion_cueing.evaluation.endurance.checks import drive_and_check
 from motion_cueing.evaluation.endurance.run import seeded_drives
+from motion_cueing.evaluation.rollout import Rollout
 
 from ...train.agents import agent
-from ..studies import PAPER
+from ..studies.bends import PAPER
 
 SHORT = Endurance(duration=7.0, machines=3)
 """The first three seconds of a drive are straight."""
@@ -31,6 +32,12 @@ CABIN = TaskOptions(
     observation=ObservationOptions(preview=2, memory=(1.0,), frame="cab", true_motion=True),
     action=ActionOptions(repeat=2, frame="cab", authority=0.2),
 )
+
+
+def at_once(policy, cues, platform, machine_of, endurance, condition):
+    """A rollout of drives side by side under a condition."""
+    machines = Machines(cues, endurance.machines_under(condition, platform), machine_of)
+    return Rollout(policy, machines, finite=True)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +90,7 @@ def test_ranges_go_from_low_to_high(fields):
 def test_a_batch_is_measured_as_single_drives_are(drives, policy, condition):
     machine_of = [0 if condition == NOMINAL else drive.machine for drive in drives]
     cues = [drive.cues for drive in drives]
-    found, _ = watched(batch_driver(policy, cues, PAPER, machine_of, SHORT, condition), PAPER)
+    found, _ = drive_and_check(at_once(policy, cues, PAPER, machine_of, SHORT, condition), PAPER)
     machines = SHORT.machines_under(condition, PAPER)
     assert len(set(machine_of)) > (condition == SLOWER)
     for k in (0, 1, 4):
@@ -99,7 +106,7 @@ def test_a_batch_is_measured_as_single_drives_are(drives, policy, condition):
 
 def test_a_washout_is_measured_to_the_last_digit(drives):
     cues, policy = [drive.cues for drive in drives], make_policy("classical", PAPER)
-    found, _ = watched(batch_driver(policy, cues, PAPER, [0] * 5, SHORT, NOMINAL), PAPER)
+    found, _ = drive_and_check(at_once(policy, cues, PAPER, [0] * 5, SHORT, NOMINAL), PAPER)
     for one, drive in zip(found, cues, strict=True):
         metrics = measure(rollout(policy, drive, PAPER))
         assert one.cue_error == pytest.approx(metrics.cue_error, rel=1e-12)
@@ -125,8 +132,8 @@ class Throttle:
 @pytest.mark.parametrize("condition", [NOMINAL, SLOWER])
 def test_full_throttle_is_held_back_and_exceeds_nothing(drives, task, condition):
     cues = [drive.cues for drive in drives]
-    driver = batch_driver(Throttle(task), cues, PAPER, [0, 0, 0, 0, 0], SHORT, condition)
-    found, nearest = watched(driver, PAPER)
+    driver = at_once(Throttle(task), cues, PAPER, [0, 0, 0, 0, 0], SHORT, condition)
+    found, nearest = drive_and_check(driver, PAPER)
     for one in found:
         assert one.at_limit > 0.9
         assert one.beyond == sum(one.exceeded.values()) == one.actions_not_finite == 0
@@ -139,7 +146,7 @@ def test_a_machine_with_less_travel_than_its_limiter_thinks_is_found_out(drives)
     """The check knows nothing of the limiter: held against a smaller machine, the same motion fails."""
     smaller = replace(PAPER, carriage=replace(PAPER.carriage, acceleration=0.5 * PAPER.carriage.acceleration))
     cues = [drives[0].cues]
-    found, _ = watched(batch_driver(Throttle(), cues, PAPER, [0], SHORT, NOMINAL), smaller)
+    found, _ = drive_and_check(at_once(Throttle(), cues, PAPER, [0], SHORT, NOMINAL), smaller)
     assert found[0].exceeded["acceleration"] == found[0].beyond > 1
     assert found[0].exceeded["position"] == 0
 
@@ -160,7 +167,7 @@ class Broken:
 
 def test_actions_that_are_no_numbers_are_counted_and_not_done(drives):
     cues = [drive.cues for drive in drives[:3]]
-    found, _ = watched(batch_driver(Broken(), cues, PAPER, [0] * 3, SHORT, NOMINAL), PAPER)
+    found, _ = drive_and_check(at_once(Broken(), cues, PAPER, [0] * 3, SHORT, NOMINAL), PAPER)
     assert [one.actions_not_finite for one in found] == [0, 70, 0]
     assert all(one.beyond == 0 and one.cue_error is not None for one in found)
 
@@ -168,17 +175,17 @@ def test_actions_that_are_no_numbers_are_counted_and_not_done(drives):
 def test_a_policy_that_knows_its_drive_is_told_each(drives):
     class Knowing:
         def __init__(self) -> None:
-            self.told: list[str] = []
+            self.drives: list[str] = []
 
         def for_drive(self, cues: CueTrace):
-            self.told.append(cues.name)
+            self.drives.append(cues.name)
             return make_policy("classical", PAPER)
 
     knowing, cues = Knowing(), [drive.cues for drive in drives]
-    found, _ = watched(batch_driver(knowing, cues, PAPER, [0] * 5, SHORT, NOMINAL), PAPER)
+    found, _ = drive_and_check(at_once(knowing, cues, PAPER, [0] * 5, SHORT, NOMINAL), PAPER)
     washout = make_policy("classical", PAPER)
-    batch, _ = watched(batch_driver(washout, cues, PAPER, [0] * 5, SHORT, NOMINAL), PAPER)
-    assert knowing.told == [one.name for one in cues]
+    batch, _ = drive_and_check(at_once(washout, cues, PAPER, [0] * 5, SHORT, NOMINAL), PAPER)
+    assert knowing.drives == [one.name for one in cues]
     assert found == batch
 
 
@@ -186,6 +193,6 @@ def test_lag_is_that_of_the_machine(drives):
     """A machine is slower by its own lag: the pool's members differ in what they give."""
     cues = [drives[0].cues] * 3
     policy = make_policy("classical", PAPER)
-    found, _ = watched(batch_driver(policy, cues, PAPER, [0, 1, 1], SHORT, SLOWER), PAPER)
+    found, _ = drive_and_check(at_once(policy, cues, PAPER, [0, 1, 1], SHORT, SLOWER), PAPER)
     assert found[1] == found[2] != found[0]
     assert PAPER.hexapod.dynamics == ActuatorDynamics()

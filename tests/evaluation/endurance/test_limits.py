@@ -14,7 +14,7 @@ from motion_cueing.evaluation.endurance.checks import KINDS, TOLERANCE, TrueLimi
 from ...envs.platform.platforms_under_test import PRESETS
 from ...reference import MachineModel
 from ...reference import kinematics as plain
-from ..studies import PAPER, bend
+from ..studies.bends import PAPER, bend
 
 RNG = np.random.default_rng(4)
 POSE, POSE_RATE = 0.1 * RNG.normal(size=(50, 6)), 0.3 * RNG.normal(size=(50, 6))

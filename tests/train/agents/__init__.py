@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from motion_cueing.baselines.registry import POLICIES
 from motion_cueing.baselines.washout.classical.scheduled import KNOBS
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.envs.task.observation import layout_of
-from motion_cueing.train.agents import Agent, Network, Record
+from motion_cueing.train.agents import Agent, Network, Record, names
 
 RECORD = Record(
     algo="ppo", seed=3, command="motion-cueing train --algo ppo", steps=1000, versions={"numpy": "2.0"}
@@ -37,3 +38,12 @@ def agent(task: TaskOptions | None = None, base: Any = None, name: str = "random
     outputs = len(KNOBS) if task.action.mode == "gains" else 9
     size = layout_of(task.observation, task.action.mode, outputs).size
     return Agent(name, task, network((size, 16, 16, outputs), **choices), RECORD, base)
+
+
+def ship(folder, monkeypatch):
+    """Let the agents in a folder, and no others, come with the package until the test is over."""
+    own = {name: entry for name, entry in POLICIES._entries.items() if name not in names.agent_names()}
+    # Private, as a registry has no other way to forget a name.
+    monkeypatch.setattr(POLICIES, "_entries", own)
+    monkeypatch.setattr(names, "FOLDER", folder)
+    names.register_agents(folder)

@@ -98,10 +98,10 @@ def test_an_agent_file_keeps_that_it_is_told(tmp_path):
     one = agent(told(action={"largest": [float(k) for k in range(1, 10)]}), name="any")
     one.save(tmp_path / "any.safetensors")
     read = type(one).load(tmp_path / "any.safetensors")
-    assert read.told
+    assert read.task.observation.machine
     assert read.task == one.task
     assert "any motion base, which it is told" in read.description
-    assert not agent().told
+    assert not agent().task.observation.machine
 
 
 def test_the_exported_file_says_what_is_seen_of_the_machine(tmp_path):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ....baselines import make_policy
-from ....baselines.policy import ForeknowingPolicy, Policy
+from ....baselines.policy import Policy
 from ....envs.cues import CueTrace
 from ....envs.errors import ConfigurationError
 from ....envs.maneuvers import drive_seeds
@@ -66,7 +66,7 @@ class Teacher:
 
     def begin(self) -> None:
         """The batch has begun an episode everywhere."""
-        if isinstance(self._made, ForeknowingPolicy):
+        if self._made.needs_drive:
             self._controllers = [self._made.for_drive(rest) for rest in self._rests()]
         else:
             self._controllers = [self._made]

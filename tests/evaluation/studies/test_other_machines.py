@@ -11,9 +11,12 @@ from motion_cueing.envs.platform import ablation_names, ablations, get_platform,
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.evaluation.rollout import rollout
-from motion_cueing.evaluation.studies.study import moved_to, policy_on
 
-from .studies import PAPER, bend
+from .bends import PAPER, bend
+
+
+def policy_on(name, platform):
+    return make_policy(name, platform, force=True)
 
 
 def test_ablations_lock_what_a_machine_has():
@@ -59,6 +62,6 @@ def test_an_agent_is_forced_onto_another_machine():
     assert np.abs(drive_.hexapod).max() > 1e-4
     with pytest.raises(ConfigurationError):
         make_policy("learned-preview", machine)
-    assert moved_to(make_policy("learned-preview", PAPER), machine).platform == machine
+    assert make_policy("learned-preview", PAPER).on(machine).platform == machine
     still = NoMotion()
-    assert moved_to(still, machine) is still
+    assert still.on(machine) is still

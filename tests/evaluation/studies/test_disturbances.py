@@ -9,16 +9,16 @@ from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.evaluation.rollout import rollout
 from motion_cueing.evaluation.studies import disturbances
-from motion_cueing.evaluation.studies.disturbances import Disturbances, Study, fiercer
+from motion_cueing.evaluation.studies.disturbances import Disturbances, Study, time_scaled
 from motion_cueing.evaluation.studies.store import drive_key
 
-from .studies import PAPER, SEDAN, bend
+from .bends import PAPER, SEDAN, bend
 
 
 def test_the_same_way_twice_as_fiercely():
     """A bend keeps its radius a / w^2 and its total angle; roll and pitch, as gravity in f, double."""
     cues = bend(seconds=6.0)
-    fierce = fiercer(cues, 2.0)
+    fierce = time_scaled(cues, 2.0)
     speed = np.sqrt(2.0)
     assert fierce.dt == pytest.approx(cues.dt)
     assert fierce.duration == pytest.approx(cues.duration / speed, abs=0.011)
@@ -42,7 +42,7 @@ def test_the_same_way_twice_as_fiercely():
 
 def test_no_fiercer_is_the_same():
     cues = bend()
-    same = fiercer(cues, 1.0)
+    same = time_scaled(cues, 1.0)
     np.testing.assert_array_equal(same.specific_force, cues.specific_force)
     np.testing.assert_array_equal(same.time, cues.time)
 
@@ -56,14 +56,14 @@ def robust(causal=()):
 
 def test_each_condition_of_robustness_disturbs_one_thing():
     found = {one.name: one for one in robust().conditions()}
-    assert list(found) == ["nominal", "lag", "dead time", "noise", "other car", "fierce"]
+    assert list(found) == ["nominal", "lag", "dead time", "noise", "other car", "time scaling"]
     assert found["lag"].platform.hexapod.dynamics.natural_frequency == 30.0
     assert found["dead time"].platform.carriage.dynamics.dead_time == 0.05
-    for name in ("nominal", "noise", "other car", "fierce"):
+    for name in ("nominal", "noise", "other car", "time scaling"):
         assert found[name].platform == PAPER
     peaks = {name: np.abs(one.maneuvers["bend"]().specific_force[:, 1]).max() for name, one in found.items()}
     assert peaks["other car"] == pytest.approx(1.5 * peaks["nominal"])
-    assert peaks["fierce"] == pytest.approx(2.0 * peaks["nominal"], rel=1e-3)
+    assert peaks["time scaling"] == pytest.approx(2.0 * peaks["nominal"], rel=1e-3)
     assert peaks["noise"] == peaks["lag"] == peaks["nominal"]
 
 

@@ -29,8 +29,8 @@ from motion_cueing.evaluation.studies.results import (
 from motion_cueing.evaluation.studies.store import identity
 from motion_cueing.evaluation.studies.study import Condition, run_study
 
-from .studies import PAPER, SEDAN, bend
-from .synthetic import drive
+from ..synthetic import drive
+from .bends import PAPER, SEDAN, bend
 
 GAINS = {"no-motion": 0.0, "classical-tuned": 0.6, "mine": 0.8, "optimum": 0.95}
 
@@ -80,8 +80,8 @@ def test_what_is_done_is_not_driven_again(roll, tmp_path):
     assert outcome.driven == 0
     assert again.metrics == first.metrics
     assert (
-        again.notes
-        == first.notes
+        again.statistics
+        == first.statistics
         == {name.name: {"optimum": {m: {"solves": "7"} for m in ("bend", "ridge")}} for name in CONDITIONS}
     )
     assert len(roll) == 16
