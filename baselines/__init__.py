@@ -10,16 +10,15 @@ from .registry import default_policies, describe_policy, make_policy, policy_nam
 
 if TYPE_CHECKING:
     from .policy import Information, NoMotion, Policy, TaskPolicy, as_policy
-    from .washout.parameters import WashoutParameters
-    from .washout.policy import ClassicalWashout
+    from .washout import ClassicalWashout, WashoutParameters
 
 _LAZY = {
-    "ClassicalWashout": ".washout.policy",
+    "ClassicalWashout": ".washout",
     "Information": ".policy",
     "NoMotion": ".policy",
     "Policy": ".policy",
     "TaskPolicy": ".policy",
-    "WashoutParameters": ".washout.parameters",
+    "WashoutParameters": ".washout",
     "as_policy": ".policy",
 }
 
