@@ -80,8 +80,8 @@ def test_what_is_done_is_not_driven_again(roll, tmp_path):
     assert outcome.driven == 0
     assert again.metrics == first.metrics
     assert (
-        again.statistics
-        == first.statistics
+        again.notes
+        == first.notes
         == {name.name: {"optimum": {m: {"solves": "7"} for m in ("bend", "ridge")}} for name in CONDITIONS}
     )
     assert len(roll) == 16
