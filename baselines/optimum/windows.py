@@ -261,10 +261,10 @@ _WIDER: Final = 3.0
 
 
 class Window(NamedTuple):
-    """Time steps of a drive: planned from ``first`` to ``last``, applied up to ``kept``."""
+    """Time steps of a drive: planned from ``first`` to ``last``, applied up to ``applied``."""
 
     first: int
-    kept: int
+    applied: int
     last: int
 
 
@@ -272,11 +272,11 @@ def windows(steps: int, options: OptimumOptions, dt: float) -> Iterator[Window]:
     """The windows of a drive of some time steps; they begin at nodes."""
     spacing = options.steps * dt
     length = max(round(options.window / spacing), 1) * options.steps
-    kept = max(round(options.keep / spacing), 1) * options.steps
+    applied = max(round(options.keep / spacing), 1) * options.steps
     first = 0
     while first + length < steps:
-        yield Window(first, first + kept, first + length)
-        first += kept
+        yield Window(first, first + applied, first + length)
+        first += applied
     yield Window(first, steps, steps)
 
 
@@ -338,13 +338,13 @@ class Planner:
         """The plan of the whole drive."""
         began, steps = time.perf_counter(), len(self._cues) - 1
         first = self._costs(np.array([self._player.state]))[0]
-        kept = []
+        applied = []
         for window in windows(steps, self._options, self._cues.dt):
             self._share = window.first / steps
             played = self._solved(window)
             self._counts.windows += 1
             self._counts.played.append(self._costs(played.states))
-            kept.append(played.accelerations)
+            applied.append(played.accelerations)
         counts = self._counts
         report = PlanReport(
             objective=self._options.objective,
@@ -357,14 +357,14 @@ class Planner:
             braked=counts.braked,
             seconds=time.perf_counter() - began,
         )
-        return Plan(np.concatenate(kept), self._start, report)
+        return Plan(np.concatenate(applied), self._start, report)
 
     def _solved(self, window: Window) -> Playback:
         """The applied part of a window; braking where no plan keeps the limits."""
         counts, options = self._counts, self._options
         before, begins = self._player.snapshot(), self._window_start()
         reference = self._reference[window.first + 1 : window.last + 1]
-        length = window.kept - window.first
+        length = window.applied - window.first
         margin, clear = options.margin, False
         for attempt in range(options.widenings + 1):
             solution = self._program(margin, clear).solve(reference, begins)

@@ -72,8 +72,8 @@ class AdaptiveParameters(WashoutParameters):
     """The whole algorithm: every field of :class:`~..washout.WashoutParameters`, and two more.
 
     Args:
-        algorithm: Tells files of the families apart.
-        adaptation: Of the gains that multiply what HPS lets pass, and the Euler rates before HPR.
+        algorithm: Family, as parameter files name it.
+        adaptation: Adaptation of the gains on the output of HPS and on the Euler rates before HPR.
     """
 
     algorithm: Literal["adaptive"] = "adaptive"

@@ -1,13 +1,13 @@
 """One step of the adaptive washout: the classical one with gains, and the steepest descent of the gains.
 
-A gain stands before each high-pass that feeds an integrator: one an axis of the cab on what HPS lets pass,
-one on each Euler rate. What a gain does to the motion, dQ'/dp, is the same high-pass driven by what the gain
-multiplies. Then (Parrish, Dieudonne, Bowles and Martin 1975; Nahon and Reid 1990)
+A gain p stands before each high-pass that feeds an integrator: one an axis of the cab on the output of HPS,
+and one on each Euler rate. The sensitivity of the motion to a gain, dQ'/dp, is the same high-pass driven by
+the signal that the gain multiplies. Then (Parrish, Dieudonne, Bowles and Martin 1975; Nahon and Reid 1990)
 
     C = 1/2 (|a2S - L_SI Q''|^2 + |Q'|^2 + |Q'.|^2 + (p - 1)^2), each over its scale,   dp/dt = -G dC/dp
 
-is integrated by a step that is implicit in C's own curvature: the published law for small steps, and it
-cannot overshoot C's minimum however large the input.
+is integrated by a step that is implicit in the curvature of C. It is the published law for small steps, and
+cannot overshoot the minimum of C, however large the input.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class AdaptiveKernelParameters:
 
 
 @wp.struct
-class Effect:
+class Sensitivity:
     """dQ'/dp of one gain, and its rate; in F_I."""
 
     position: vec3
@@ -47,25 +47,25 @@ class Effect:
 
 @wp.struct
 class AdaptiveMemory:
-    """The states of all filters, of the gains, and of what the gains do."""
+    """States of all filters, gains and sensitivities."""
 
     washout: Memory
     gains: Gains
-    forward: Effect
-    sideways: Effect
-    vertical: Effect
+    forward: Sensitivity
+    sideways: Sensitivity
+    vertical: Sensitivity
     hpr_position: vec3  # of HPR driven by the Euler rates themselves
     hpr_velocity: vec3
-    beta_effect: vec3  # d beta1HP / dp, each Euler angle by its own gain
-    beta_effect_rate: vec3
+    beta_sensitivity: vec3  # d beta1HP / dp, each Euler angle by its own gain
+    beta_sensitivity_rate: vec3
 
 
 @wp.struct
-class Adapted:
-    """A gain and its effect after a step."""
+class AdaptedGain:
+    """A gain and its sensitivity after a step."""
 
     gain: real
-    effect: Effect
+    sensitivity: Sensitivity
 
 
 @wp.struct
@@ -77,24 +77,26 @@ class AdaptiveCommand:
 
 
 @wp.func
-def descended(gain: real, speed: real, slope: real, curvature: real, low: real, high: real, dt: real) -> real:
+def gradient_step(
+    gain: real, speed: real, slope: real, curvature: real, low: real, high: real, dt: real
+) -> real:
     """A gain one step of steepest descent later."""
     return wp.clamp(gain - dt * speed * slope / (real(1.0) + dt * speed * curvature), low, high)
 
 
 @wp.func
 def adapted_force_gain(
-    p: AdaptiveKernelParameters, m: AdaptiveMemory, s: Step, effect: Effect, axis: int, dt: real
-) -> Adapted:
-    """One translational gain and its effect after the step."""
+    p: AdaptiveKernelParameters, m: AdaptiveMemory, s: Step, sensitivity: Sensitivity, axis: int, dt: real
+) -> AdaptedGain:
+    """One translational gain and its sensitivity after the step."""
     l_is = s.inputs.l_is
-    drive = vec3(l_is[0, axis], l_is[1, axis], l_is[2, axis]) * s.inputs.passed[axis]
-    acceleration = classical.high_pass_in_space(p.washout, effect.position, effect.velocity, drive, dt)
+    drive = vec3(l_is[0, axis], l_is[1, axis], l_is[2, axis]) * s.inputs.a2s_passed[axis]
+    d = sensitivity.position
+    v = sensitivity.velocity
+    acceleration = classical.high_pass_in_space(p.washout, d, v, drive, dt)
     # Lengths are the same in F_S and F_I: the error need not be turned into the cab.
-    error = l_is * s.inputs.missing - s.q
+    error = l_is * s.inputs.a2s - s.q
     x = m.washout.displacement - m.washout.home
-    d = effect.position
-    v = effect.velocity
     gain = m.gains.force[axis]
     slope = (
         wp.dot(wp.cw_mul(p.displacement, x), d)
@@ -108,10 +110,10 @@ def adapted_force_gain(
         + p.force * wp.dot(acceleration, acceleration)
         + p.force_departure
     )
-    out = Adapted()
-    out.gain = descended(gain, p.force_speed[axis], slope, curvature, p.gain_min, p.gain_max, dt)
-    out.effect.position = d + dt * v + (real(0.5) * dt * dt) * acceleration
-    out.effect.velocity = v + dt * acceleration
+    out = AdaptedGain()
+    out.gain = gradient_step(gain, p.force_speed[axis], slope, curvature, p.gain_min, p.gain_max, dt)
+    out.sensitivity.position = d + dt * v + (real(0.5) * dt * dt) * acceleration
+    out.sensitivity.velocity = v + dt * acceleration
     return out
 
 
@@ -125,9 +127,9 @@ def adapted_forces(
     z = adapted_force_gain(p, m, s, m.vertical, 2, dt)
     out = after
     out.gains.force = vec3(x.gain, y.gain, z.gain)
-    out.forward = x.effect
-    out.sideways = y.effect
-    out.vertical = z.effect
+    out.forward = x.sensitivity
+    out.sideways = y.sensitivity
+    out.vertical = z.sensitivity
     return out
 
 
@@ -135,8 +137,8 @@ def adapted_forces(
 def adapted_rate_gain(p: AdaptiveKernelParameters, m: AdaptiveMemory, s: Step, axis: int, dt: real) -> real:
     """One rotational gain after the step."""
     error = s.inputs.euler_rates[axis] - m.washout.beta_hp_rate[axis]
-    d = m.beta_effect[axis]
-    v = m.beta_effect_rate[axis]
+    d = m.beta_sensitivity[axis]
+    v = m.beta_sensitivity_rate[axis]
     gain = m.gains.rate[axis]
     slope = (
         p.angle[axis] * m.washout.beta_hp[axis] * d
@@ -144,7 +146,7 @@ def adapted_rate_gain(p: AdaptiveKernelParameters, m: AdaptiveMemory, s: Step, a
         + p.rate_departure * (gain - real(1.0))
     )
     curvature = p.angle[axis] * d * d + p.rate * v * v + p.rate_departure
-    return descended(gain, p.rate_speed[axis], slope, curvature, p.gain_min, p.gain_max, dt)
+    return gradient_step(gain, p.rate_speed[axis], slope, curvature, p.gain_min, p.gain_max, dt)
 
 
 @wp.func
@@ -157,7 +159,7 @@ def adapted_rates(
     driven.hpr_position = m.hpr_position
     driven.hpr_velocity = m.hpr_velocity
     high_passed = classical.high_pass_rates(p.washout, driven, s.inputs.euler_rates, dt)
-    alpha = (high_passed - m.beta_effect_rate) * classical.rate_roll_off(p.washout, dt)
+    alpha = (high_passed - m.beta_sensitivity_rate) * classical.rate_roll_off(p.washout, dt)
     out = after
     out.gains.rate = vec3(
         adapted_rate_gain(p, m, s, 0, dt),
@@ -166,17 +168,17 @@ def adapted_rates(
     )
     out.hpr_position = m.hpr_position + dt * m.hpr_velocity + half * high_passed
     out.hpr_velocity = m.hpr_velocity + dt * high_passed
-    out.beta_effect = m.beta_effect + dt * m.beta_effect_rate + half * alpha
-    out.beta_effect_rate = m.beta_effect_rate + dt * alpha
+    out.beta_sensitivity = m.beta_sensitivity + dt * m.beta_sensitivity_rate + half * alpha
+    out.beta_sensitivity_rate = m.beta_sensitivity_rate + dt * alpha
     return out
 
 
 @wp.func
-def initial_adaptive_memory(p: AdaptiveKernelParameters, seen: Reading) -> AdaptiveMemory:
+def initial_adaptive_memory(p: AdaptiveKernelParameters, now: Reading) -> AdaptiveMemory:
     """Filters at rest, gains at 1."""
     one = real(1.0)
     m = AdaptiveMemory()
-    m.washout = initial_memory(p.washout, seen)
+    m.washout = initial_memory(p.washout, now)
     m.gains.force = vec3(one, one, one)
     m.gains.rate = vec3(one, one, one)
     return m
@@ -184,10 +186,10 @@ def initial_adaptive_memory(p: AdaptiveKernelParameters, seen: Reading) -> Adapt
 
 @wp.func
 def adaptive_washout(
-    p: AdaptiveKernelParameters, m: AdaptiveMemory, seen: Reading, dt: real
+    p: AdaptiveKernelParameters, m: AdaptiveMemory, now: Reading, dt: real
 ) -> AdaptiveCommand:
     """One step."""
-    s = classical.washout_with(p.washout, m.gains, m.washout, seen, dt)
+    s = classical.washout_with(p.washout, m.gains, m.washout, now, dt)
     after = AdaptiveMemory()
     after.washout = s.command.memory
     after = adapted_forces(p, m, s, after, dt)

@@ -1,8 +1,17 @@
-"""The filter blocks of the washout, as states and accelerations, discretized by the trapezoidal rule.
+"""Structs and blocks of the classical washout; the other families use them, too.
 
-A high-pass before a double integrator is one oscillator: its acceleration is the filter's output and its
-position the integral, so the zeros at s = 0 (z = 1) cancel the integrators exactly and nothing drifts.
-Within a step the acceleration is constant, as in the machine.
+**Filters.** Discretized by the trapezoidal rule, as states and accelerations. A high-pass before a double
+integrator is one oscillator: its acceleration is the filter's output, and its position the integral. So the
+zeros at s = 0 (z = 1) cancel the integrators exactly, and nothing drifts. Within a step the acceleration is
+constant, as in the machine.
+
+**Tilt coordination.** Eqs. (18) to (21), with limits of rate and acceleration that do not overshoot.
+
+**Input.** A :class:`Reading`, from an observation or from the simulator's state.
+
+**Command and anti-windup.** Accelerations are outputs of the filters' own states. The command adds a gentle
+pull of the machine to this reference, and the reference is led to a machine that a limit held back. Both are
+zero unless a limit has come between.
 """
 
 from __future__ import annotations
@@ -47,12 +56,9 @@ def low_pass(frequency: real, damping: real, x: real, v: real, u: real, dt: real
 
 
 @wp.func
-def moved(x: real, v: real, acceleration: real, dt: real) -> vec2:
+def integrated(x: real, v: real, acceleration: real, dt: real) -> vec2:
     """Position and velocity after a step of constant acceleration."""
     return vec2(x + dt * v + real(0.5) * dt * dt * acceleration, v + dt * acceleration)
-
-
-# What the washout's kernels hold: parameters, filter states, and what goes from block to block.
 
 
 @wp.struct
@@ -114,7 +120,7 @@ class Memory:
 
 @wp.struct
 class Reading:
-    """What the algorithm reads from an observation."""
+    """Input of a step: reference cue and set-point of the machine."""
 
     force: vec3  # f_AA
     rate: vec3  # omega_AA
@@ -130,7 +136,7 @@ class Reading:
 
 @wp.struct
 class Rotation:
-    """The rotational half of a step: beta_H and psi_T with their rates and accelerations."""
+    """Rotation after SPLIT: beta_H and psi_T with their rates and accelerations."""
 
     beta: vec3
     beta_rate: vec3
@@ -152,30 +158,27 @@ class Command:
 class Gains:
     """Factors before the high-passes that feed an integrator: 1 in the classical washout."""
 
-    force: vec3  # on what HPS lets pass, in F_S
+    force: vec3  # on the output of HPS, in F_S
     rate: vec3  # on the Euler rates
 
 
 @wp.struct
 class Inputs:
-    """What the high-passes of a step are driven by, before the gains."""
+    """Inputs of the high-passes of a step, before the gains."""
 
     euler_rates: vec3  # T_S omega'_AA
-    missing: vec3  # a2S: what the translations must add, in F_S
-    passed: vec3  # what HPS lets pass of it
+    a2s: vec3  # a2S: acceleration that the translations must add, in F_S
+    a2s_passed: vec3  # output of HPS
     l_is: mat33
 
 
 @wp.struct
 class Step:
-    """A step, and what it was driven by."""
+    """A step with the inputs of its high-passes."""
 
     command: Command
     inputs: Inputs
     q: vec3  # acceleration of Q'
-
-
-# Tilt coordination: Eqs. (18) to (21), with rate and acceleration limits that do not overshoot.
 
 
 BRAKING_SHARE = wp.constant(real(0.8))
@@ -225,9 +228,6 @@ def limited_tilt(
     return wp.clamp((wish - angle_rate) / dt, -acceleration_limit, acceleration_limit)
 
 
-# What a washout reads: from observations, or straight from the simulator's state.
-
-
 @wp.func
 def triple(row: wp.array2d(dtype=real), i: int, first: int, scale: real) -> vec3:
     """Three entries of an observation in SI units."""
@@ -244,60 +244,53 @@ def pair(row: wp.array2d(dtype=real), i: int, first: int, scale: real) -> vec2:
 def read_observation(row: wp.array2d(dtype=real), i: int) -> Reading:
     """What the algorithm needs of an observation; see ``envs.simulator.kernels.observation``."""
     one = real(1.0)
-    seen = Reading()
-    seen.force = triple(
+    now = Reading()
+    now.force = triple(
         row, i, wp.static(SLICES["reference_force"].start), real(wp.static(SCALES["reference_force"]))
     ) - vec3(real(0.0), real(0.0), real(wp.static(GRAVITY)))
-    seen.rate = triple(row, i, wp.static(SLICES["reference_rate"].start), one)
-    seen.carriage = pair(row, i, wp.static(SLICES["carriage"].start), real(wp.static(SCALES["carriage"])))
-    seen.carriage_rate = pair(
+    now.rate = triple(row, i, wp.static(SLICES["reference_rate"].start), one)
+    now.carriage = pair(row, i, wp.static(SLICES["carriage"].start), real(wp.static(SCALES["carriage"])))
+    now.carriage_rate = pair(
         row, i, wp.static(SLICES["carriage_rate"].start), real(wp.static(SCALES["carriage_rate"]))
     )
-    seen.displacement = triple(row, i, wp.static(SLICES["displacement"].start), one)
-    seen.velocity = triple(row, i, wp.static(SLICES["velocity"].start), one)
-    seen.beta = triple(row, i, wp.static(SLICES["beta"].start), one)
-    seen.beta_rate = triple(row, i, wp.static(SLICES["beta_rate"].start), one)
+    now.displacement = triple(row, i, wp.static(SLICES["displacement"].start), one)
+    now.velocity = triple(row, i, wp.static(SLICES["velocity"].start), one)
+    now.beta = triple(row, i, wp.static(SLICES["beta"].start), one)
+    now.beta_rate = triple(row, i, wp.static(SLICES["beta_rate"].start), one)
     angle = pair(row, i, wp.static(SLICES["turntable"].start), one)
-    seen.psi_t = wp.atan2(angle[0], angle[1])
-    seen.psi_t_rate = row[i, wp.static(SLICES["turntable_rate"].start)]
-    return seen
+    now.psi_t = wp.atan2(angle[0], angle[1])
+    now.psi_t_rate = row[i, wp.static(SLICES["turntable_rate"].start)]
+    return now
 
 
 @wp.func
 def read_state(state: State) -> Reading:
     """The same straight from the simulator's state."""
     p = state.setpoint
-    seen = Reading()
-    seen.force = state.reference_cue.force
-    seen.rate = state.reference_cue.rate
-    seen.carriage = vec2(p.position[0], p.position[1])
-    seen.carriage_rate = vec2(p.rate[0], p.rate[1])
-    seen.displacement = p.displacement
-    seen.velocity = p.velocity
-    seen.beta = p.beta
-    seen.beta_rate = p.beta_rate
-    seen.psi_t = p.position[8]
-    seen.psi_t_rate = p.rate[8]
-    return seen
-
-
-# Machine and reference of a washout: the command that keeps them together, and what happens after a limit.
-#
-# All accelerations are outputs of the filters' own states. They are the machine's command, plus a gentle pull
-# back to the algorithm's own reference, and the reference is led back to the machine; both are zero unless a
-# limit has come between.
+    now = Reading()
+    now.force = state.reference_cue.force
+    now.rate = state.reference_cue.rate
+    now.carriage = vec2(p.position[0], p.position[1])
+    now.carriage_rate = vec2(p.rate[0], p.rate[1])
+    now.displacement = p.displacement
+    now.velocity = p.velocity
+    now.beta = p.beta
+    now.beta_rate = p.beta_rate
+    now.psi_t = p.position[8]
+    now.psi_t_rate = p.rate[8]
+    return now
 
 
 HELD_BACK: Final = 0.001
-"""Distance between machine and reference that says that a limit has come between, m or rad."""
+"""Distance between machine and reference from which on a limit has held the machine back, m or rad."""
 
 RETURNS: Final = 10.0
-"""Times 1 / return_frequency in which the way home fades out after a limit."""
+"""Multiple of 1 / return_frequency in which the return fades out after a limit."""
 
 
 @wp.func
-def homeward(p: Parameters, order: int, recovery: real, x: real, v: real) -> real:
-    """Acceleration that leads Q' home after a limit, where HPI of this order would not."""
+def return_acceleration(p: Parameters, order: int, recovery: real, x: real, v: real) -> real:
+    """Acceleration that returns Q' after a limit, where HPI of this order would not."""
     if order == 2:
         return real(0.0)
     w = p.return_frequency
@@ -305,20 +298,20 @@ def homeward(p: Parameters, order: int, recovery: real, x: real, v: real) -> rea
 
 
 @wp.func
-def recovered(p: Parameters, m: Memory, q: vec3) -> vec3:
-    """The acceleration of Q' with what leads it home; without a limit it is as it was."""
+def with_return(p: Parameters, m: Memory, q: vec3) -> vec3:
+    """Acceleration of Q' with its return after a limit; unchanged without one."""
     x = m.displacement - m.home
     v = m.velocity
     return q + vec3(
-        homeward(p, p.hpi_x.order, m.recovery, x[0], v[0]),
-        homeward(p, p.hpi_y.order, m.recovery, x[1], v[1]),
-        homeward(p, p.hpi_z.order, m.recovery, x[2], v[2]),
+        return_acceleration(p, p.hpi_x.order, m.recovery, x[0], v[0]),
+        return_acceleration(p, p.hpi_y.order, m.recovery, x[1], v[1]),
+        return_acceleration(p, p.hpi_z.order, m.recovery, x[2], v[2]),
     )
 
 
 @wp.func
-def hexapod_yaw_home(p: Parameters, m: Memory) -> vec3:
-    """Yaw rate that takes the hexapod's yaw home after a limit; the turntable may stand anywhere."""
+def yaw_return_rate(p: Parameters, m: Memory) -> vec3:
+    """Yaw rate that returns the hexapod's yaw after a limit; the turntable may stand anywhere."""
     share = real(1.0) - p.turntable_share
     return vec3(real(0.0), real(0.0), m.recovery * p.return_frequency * share * m.beta_hp[2])
 
@@ -330,47 +323,47 @@ def wrapped(angle: real) -> real:
 
 
 @wp.func
-def pull(p: Parameters, error: real, error_rate: real) -> real:
+def tracking(p: Parameters, error: real, error_rate: real) -> real:
     """Acceleration that leads the machine back to the reference, critically damped."""
     w = p.follow_frequency
     return w * w * error + real(2.0) * w * error_rate
 
 
 @wp.func
-def command_axes(p: Parameters, m: Memory, seen: Reading, r: Rotation, q: vec3, c: vec2) -> vec9:
+def command_axes(p: Parameters, m: Memory, now: Reading, r: Rotation, q: vec3, c: vec2) -> vec9:
     """The nine accelerations: the algorithm's own (Eq. (50): S' = Q' - C') and the pull to its reference."""
     surge = m.displacement[0] - m.carriage[0]
     sway = m.displacement[1] - m.carriage[1]
     surge_rate = m.velocity[0] - m.carriage_rate[0]
     sway_rate = m.velocity[1] - m.carriage_rate[1]
     return vec9(
-        c[0] + pull(p, m.carriage[0] - seen.carriage[0], m.carriage_rate[0] - seen.carriage_rate[0]),
-        c[1] + pull(p, m.carriage[1] - seen.carriage[1], m.carriage_rate[1] - seen.carriage_rate[1]),
-        q[0] - c[0] + pull(p, surge - seen.displacement[0], surge_rate - seen.velocity[0]),
-        q[1] - c[1] + pull(p, sway - seen.displacement[1], sway_rate - seen.velocity[1]),
-        q[2] + pull(p, m.displacement[2] - seen.displacement[2], m.velocity[2] - seen.velocity[2]),
-        r.beta_acceleration[0] + pull(p, r.beta[0] - seen.beta[0], r.beta_rate[0] - seen.beta_rate[0]),
-        r.beta_acceleration[1] + pull(p, r.beta[1] - seen.beta[1], r.beta_rate[1] - seen.beta_rate[1]),
-        r.beta_acceleration[2] + pull(p, r.beta[2] - seen.beta[2], r.beta_rate[2] - seen.beta_rate[2]),
-        r.psi_t_acceleration + pull(p, wrapped(r.psi_t - seen.psi_t), r.psi_t_rate - seen.psi_t_rate),
+        c[0] + tracking(p, m.carriage[0] - now.carriage[0], m.carriage_rate[0] - now.carriage_rate[0]),
+        c[1] + tracking(p, m.carriage[1] - now.carriage[1], m.carriage_rate[1] - now.carriage_rate[1]),
+        q[0] - c[0] + tracking(p, surge - now.displacement[0], surge_rate - now.velocity[0]),
+        q[1] - c[1] + tracking(p, sway - now.displacement[1], sway_rate - now.velocity[1]),
+        q[2] + tracking(p, m.displacement[2] - now.displacement[2], m.velocity[2] - now.velocity[2]),
+        r.beta_acceleration[0] + tracking(p, r.beta[0] - now.beta[0], r.beta_rate[0] - now.beta_rate[0]),
+        r.beta_acceleration[1] + tracking(p, r.beta[1] - now.beta[1], r.beta_rate[1] - now.beta_rate[1]),
+        r.beta_acceleration[2] + tracking(p, r.beta[2] - now.beta[2], r.beta_rate[2] - now.beta_rate[2]),
+        r.psi_t_acceleration + tracking(p, wrapped(r.psi_t - now.psi_t), r.psi_t_rate - now.psi_t_rate),
     )
 
 
 @wp.func
-def led_back(p: Parameters, m: Memory, seen: Reading, r: Rotation, after: Memory, dt: real) -> Memory:
-    """The references led towards a machine that a limit held back, so that nothing winds up.
+def anti_windup(p: Parameters, m: Memory, now: Reading, r: Rotation, after: Memory, dt: real) -> Memory:
+    """Anti-windup: leads the references towards a machine that a limit held back.
 
     Without a limit the machine is where the reference is, and this changes nothing.
     """
     k = p.follow_frequency * dt
-    c = seen.carriage - m.carriage
-    c_rate = seen.carriage_rate - m.carriage_rate
-    moved_by = vec3(seen.carriage[0], seen.carriage[1], real(0.0)) + seen.displacement - m.displacement
-    moved_rate = vec3(seen.carriage_rate[0], seen.carriage_rate[1], real(0.0)) + seen.velocity - m.velocity
-    b = seen.beta - r.beta
-    b_rate = seen.beta_rate - r.beta_rate
-    turned = wrapped(seen.psi_t - r.psi_t) / p.turntable_gain
-    turned_rate = (seen.psi_t_rate - r.psi_t_rate) / p.turntable_gain
+    c = now.carriage - m.carriage
+    c_rate = now.carriage_rate - m.carriage_rate
+    moved_by = vec3(now.carriage[0], now.carriage[1], real(0.0)) + now.displacement - m.displacement
+    moved_rate = vec3(now.carriage_rate[0], now.carriage_rate[1], real(0.0)) + now.velocity - m.velocity
+    b = now.beta - r.beta
+    b_rate = now.beta_rate - r.beta_rate
+    turned = wrapped(now.psi_t - r.psi_t) / p.turntable_gain
+    turned_rate = (now.psi_t_rate - r.psi_t_rate) / p.turntable_gain
     yaw = (real(1.0) - p.turntable_share) * b[2] + p.turntable_share * turned
     yaw_rate = (real(1.0) - p.turntable_share) * b_rate[2] + p.turntable_share * turned_rate
     zero = real(0.0)
@@ -390,13 +383,13 @@ def led_back(p: Parameters, m: Memory, seen: Reading, r: Rotation, after: Memory
 
 
 @wp.func
-def initial_memory(p: Parameters, seen: Reading) -> Memory:
+def initial_memory(p: Parameters, now: Reading) -> Memory:
     """Filters at rest, their references where the machine is: C'(0), S'(0) and the tilt of the start pose."""
     m = Memory()
-    m.carriage = seen.carriage * p.carriage_share
-    m.displacement = seen.displacement + vec3(m.carriage[0], m.carriage[1], real(0.0))
+    m.carriage = now.carriage * p.carriage_share
+    m.displacement = now.displacement + vec3(m.carriage[0], m.carriage[1], real(0.0))
     m.home = m.displacement
-    m.tilt = vec2(seen.beta[0], seen.beta[1])
-    m.psi_t_start = seen.psi_t
-    m.psi_h_start = seen.beta[2]
+    m.tilt = vec2(now.beta[0], now.beta[1])
+    m.psi_t_start = now.psi_t
+    m.psi_h_start = now.beta[2]
     return m

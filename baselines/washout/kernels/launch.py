@@ -59,11 +59,11 @@ def predict_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
     ) -> None:
         i = wp.tid()
         p = parameters[parameters_of[i]]
-        seen = read_observation(observation, i)
+        now = read_observation(observation, i)
         m = memory[i]
         if begins[i]:
-            m = begin(p, seen)
-        out = step(p, m, seen, dt)
+            m = begin(p, now)
+        out = step(p, m, now, dt)
         memory_out[i] = out.memory
         action[i] = out.action
 
@@ -133,11 +133,11 @@ def act_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
     ) -> None:
         i = wp.tid()
         p = parameters[parameters_of[i]]
-        seen = read_state(state[i])
+        now = read_state(state[i])
         m = memory[i]
         if begins != 0:
-            m = begin(p, seen)
-        out = step(p, m, seen, dt)
+            m = begin(p, now)
+        out = step(p, m, now, dt)
         memory_out[i] = out.memory
         action[i] = out.action
 

@@ -4,7 +4,7 @@ r"""One step of the classical washout, Figures 2 and 3 of the paper, block by bl
     f_AA -> scale, limit -> f1 -> LP -> N -> limit -> betaSL
                         \-> a2S -> HPS -> L_IS -> HPI -> Q' -> LPC -> C', S'
 
-What keeps machine and reference together stands in ``following``.
+Symbols and equation numbers are the paper's. Command and anti-windup are in :mod:`.blocks`.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from .blocks import (
     Reading,
     Rotation,
     Step,
+    anti_windup,
     command_axes,
-    hexapod_yaw_home,
     high_pass,
-    led_back,
+    integrated,
     limited_tilt,
     low_pass,
-    moved,
-    recovered,
     tilt_angle_rates,
     tilt_angles,
+    with_return,
+    yaw_return_rate,
 )
 
 
@@ -120,7 +120,7 @@ def cab_relative_acceleration(p: Parameters, r: Rotation) -> vec3:
 
 
 @wp.func
-def missing_acceleration(p: Parameters, r: Rotation, l_is: mat33, force: vec3) -> vec3:
+def a2s_acceleration(p: Parameters, r: Rotation, l_is: mat33, force: vec3) -> vec3:
     """Eq. (48): a2S, what the translations must add."""
     aa_s = wp.transpose(turntable_rotation(r.psi_t)) * cab_relative_acceleration(p, r)
     return force - aa_s + wp.transpose(l_is) * gravity()
@@ -175,8 +175,8 @@ def advance_low_pass(p: Parameters, m: Memory, f1: vec3, dt: real) -> Memory:
     a_x = low_pass(p.tilt_frequency, p.tilt_damping, m.low_force[0], m.low_force_rate[0], f1[0], dt)
     a_y = low_pass(p.tilt_frequency, p.tilt_damping, m.low_force[1], m.low_force_rate[1], f1[1], dt)
     after = m
-    x = moved(m.low_force[0], m.low_force_rate[0], a_x, dt)
-    y = moved(m.low_force[1], m.low_force_rate[1], a_y, dt)
+    x = integrated(m.low_force[0], m.low_force_rate[0], a_x, dt)
+    y = integrated(m.low_force[1], m.low_force_rate[1], a_y, dt)
     after.low_force = vec2(x[0], y[0])
     after.low_force_rate = vec2(x[1], y[1])
     return after
@@ -210,8 +210,8 @@ def yaw_share(p: Parameters) -> real:
 def advance_high_pass_in_cab(m: Memory, passed: vec3, dt: real) -> Memory:
     """HPS FILT after the step."""
     after = m
-    hps_x = moved(m.hps_position[0], m.hps_velocity[0], passed[0], dt)
-    hps_y = moved(m.hps_position[1], m.hps_velocity[1], passed[1], dt)
+    hps_x = integrated(m.hps_position[0], m.hps_velocity[0], passed[0], dt)
+    hps_y = integrated(m.hps_position[1], m.hps_velocity[1], passed[1], dt)
     after.hps_position = vec2(hps_x[0], hps_y[0])
     after.hps_velocity = vec2(hps_x[1], hps_y[1])
     return after
@@ -224,42 +224,42 @@ def rate_roll_off(p: Parameters, dt: real) -> real:
 
 
 @wp.func
-def washout_with(p: Parameters, gains: Gains, m: Memory, seen: Reading, dt: real) -> Step:
+def washout_with(p: Parameters, gains: Gains, m: Memory, now: Reading, dt: real) -> Step:
     """One step with gains before the high-passes, in the paper's order of blocks."""
-    force = limited_force(p, seen.force)
+    force = limited_force(p, now.force)
     beta_s = cab_angles(p, m)
     inputs = Inputs()
-    inputs.euler_rates = rate_matrix_inverse(beta_s) * limited_rate_cue(p, seen.rate)
+    inputs.euler_rates = rate_matrix_inverse(beta_s) * limited_rate_cue(p, now.rate)
     high_passed = high_pass_rates(p, m, wp.cw_mul(gains.rate, inputs.euler_rates), dt)
-    alpha = (high_passed - hexapod_yaw_home(p, m) - m.beta_hp_rate) * rate_roll_off(p, dt)
+    alpha = (high_passed - yaw_return_rate(p, m) - m.beta_hp_rate) * rate_roll_off(p, dt)
     tilt = tilt_acceleration(p, m, beta_s[2], yaw_share(p) * m.beta_hp_rate[2], dt)
     r = split(p, m, alpha, tilt)
 
     aa1_h = centripetal_part(point_on_platform(p.cab, r.psi_t), r.psi_t_rate)
     f1 = force - wp.transpose(turntable_rotation(r.psi_t)) * aa1_h
     inputs.l_is = cab_to_inertial(r.beta, r.psi_t)
-    inputs.missing = missing_acceleration(p, r, inputs.l_is, force)
-    inputs.passed = high_pass_in_cab(p, m, inputs.missing, dt)
-    a2i = inputs.l_is * wp.cw_mul(gains.force, inputs.passed)
-    q = recovered(p, m, high_pass_in_space(p, m.displacement, m.velocity, a2i, dt))
+    inputs.a2s = a2s_acceleration(p, r, inputs.l_is, force)
+    inputs.a2s_passed = high_pass_in_cab(p, m, inputs.a2s, dt)
+    a2i = inputs.l_is * wp.cw_mul(gains.force, inputs.a2s_passed)
+    q = with_return(p, m, high_pass_in_space(p, m.displacement, m.velocity, a2i, dt))
     c = carriage_acceleration(p, m, dt)
 
-    after = advance_translation(advance_high_pass_in_cab(m, inputs.passed, dt), q, c, dt)
+    after = advance_translation(advance_high_pass_in_cab(m, inputs.a2s_passed, dt), q, c, dt)
     after = advance_rotation(p, after, high_passed, alpha, tilt, dt)
     after = advance_low_pass(p, after, f1, dt)
     out = Step()
-    out.command.memory = led_back(p, m, seen, r, after, dt)
-    out.command.action = command_axes(p, m, seen, r, q, c)
+    out.command.memory = anti_windup(p, m, now, r, after, dt)
+    out.command.action = command_axes(p, m, now, r, q, c)
     out.inputs = inputs
     out.q = q
     return out
 
 
 @wp.func
-def washout(p: Parameters, m: Memory, seen: Reading, dt: real) -> Command:
+def washout(p: Parameters, m: Memory, now: Reading, dt: real) -> Command:
     """One step of the classical washout."""
     one = real(1.0)
     gains = Gains()
     gains.force = vec3(one, one, one)
     gains.rate = vec3(one, one, one)
-    return washout_with(p, gains, m, seen, dt).command
+    return washout_with(p, gains, m, now, dt).command

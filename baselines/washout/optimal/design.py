@@ -1,4 +1,16 @@
-"""Parameters of the optimal washout: what each error and each movement of the machine costs."""
+"""Design of the optimal washout: weights, the linear-quadratic problems of its channels, and their filters.
+
+Sivan, Ish-Shalom and Huang (1982), in the form of Telban and Cardullo, NASA/CR-2005-213747. The car's motion
+w is white noise through first-order filters. z are the states of machine and perception. Perception is
+linear, so one set of states, driven by the difference of car and machine, is enough. u are the machine's
+accelerations:
+
+    minimize  E[y'Qy],    dz/dt = A z + B u + E w,    y = C z + D u + H w.
+
+The algebraic Riccati equation over [z, w] gives the regulator u = -K [z, w]. Regulator, machine and
+perception together are a linear filter from w to u: the washout. There are four channels: surge with pitch
+and sway with roll, where a tilt stands in for a force; heave; yaw.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +32,11 @@ from ..classical.family import Limits, LowPass, Share
 
 @configuration
 class PlaneWeights:
-    """Surge and pitch, or sway and roll: the size at which a quantity costs as much as any other at its own.
+    """Weights of surge and pitch, or of sway and roll: the size at which each quantity costs 1.
 
     Args:
-        sensed_force: Error of the sensed specific force, m/s^2.
-        sensed_rate: Error of the sensed angular velocity, rad/s.
+        sensed_force: Error of the perceived specific force, m/s^2.
+        sensed_rate: Error of the perceived angular velocity, rad/s.
         integral: Time integral of the displacement, m s.
         displacement: Of the cab from where the drive began, m.
         velocity: Of it, m/s.
@@ -45,10 +57,10 @@ class PlaneWeights:
 
 @configuration
 class HeaveWeights:
-    """Heave: the size at which each quantity costs 1.
+    """Weights of heave: the size at which each quantity costs 1.
 
     Args:
-        sensed_force: Error of the sensed specific force, m/s^2.
+        sensed_force: Error of the perceived specific force, m/s^2.
         integral: Time integral of the displacement, m s.
         displacement: Of the cab from where the drive began, m.
         velocity: Of it, m/s.
@@ -64,10 +76,10 @@ class HeaveWeights:
 
 @configuration
 class YawWeights:
-    """Yaw: the size at which each quantity costs 1.
+    """Weights of yaw: the size at which each quantity costs 1.
 
     Args:
-        sensed_rate: Error of the sensed angular velocity, rad/s.
+        sensed_rate: Error of the perceived angular velocity, rad/s.
         angle: Of the cab from where the drive began, rad.
         rate: Angular velocity of the cab, rad/s.
         acceleration: Angular acceleration of the cab, rad/s^2.
@@ -81,19 +93,18 @@ class YawWeights:
 
 @configuration
 class OptimalParameters:
-    """The whole algorithm.
+    """Parameters of the optimal washout.
 
     Args:
         name: Preset name.
         description: One line for people.
-        algorithm: Tells files of the families apart.
+        algorithm: Family, as parameter files name it.
         force_scale: Scale of f_AA an axis (z on f_z + g).
         force_limit: Greatest scaled specific force an axis, m/s^2 (z on f_z + g).
         rate_scale: Scale of omega_AA an axis.
         rate_limit: Greatest scaled angular velocity an axis, rad/s.
-        force_bandwidth: Of the first-order filter of white noise that stands for the car's specific force,
-            rad/s.
-        rate_bandwidth: The same of its angular velocity, rad/s.
+        force_bandwidth: Bandwidth of the first-order noise that models the car's specific force, rad/s.
+        rate_bandwidth: Bandwidth of the noise that models its angular velocity, rad/s.
         vestibular: Name of the perception model that the filters are optimal for.
         surge: Weights of surge and pitch.
         sway: Weights of sway and roll.
@@ -132,14 +143,6 @@ class OptimalParameters:
         get_vestibular_model(self.vestibular)
 
 
-# The linear-quadratic problem behind a filter, and its solution by the algebraic Riccati equation.
-#
-# Sivan, Ish-Shalom and Huang (1982), in the form of Telban and Cardullo, NASA/CR-2005-213747: the car's
-# motion
-# w is white noise through first-order filters, z the states of machine and of perception, which is driven by
-# the difference of car and machine, u the machine's accelerations; the mean of y'Qy is as small as can be.
-
-
 Matrix = NDArray[np.float64]
 
 
@@ -154,7 +157,7 @@ class StateSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class ChannelProblem:
     """Minimize the mean of y'Qy, y = C z + D u + H w.
 
     dz/dt = A z + B u + E w, dw/dt = -diag(bandwidth) w + noise.
@@ -189,7 +192,7 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Regulator:
     """The best linear regulator.
 
     Args:
@@ -203,7 +206,7 @@ class Solution:
     filter: StateSpace
 
 
-def solve(problem: Problem) -> Solution:
+def optimal_regulator(problem: ChannelProblem) -> Regulator:
     """The regulator that minimizes the cost.
 
     Raises:
@@ -220,22 +223,16 @@ def solve(problem: Problem) -> Solution:
             f"no optimal washout has these weights ({error}); bring them nearer"
         ) from None
     gain = linalg.solve(r, b.T @ riccati + s.T, assume_a="pos")
-    return Solution(riccati, gain, _closed(problem, gain))
+    return Regulator(riccati, gain, _closed_loop(problem, gain))
 
 
-def _closed(problem: Problem, gain: Matrix) -> StateSpace:
+def _closed_loop(problem: ChannelProblem, gain: Matrix) -> StateSpace:
     """The loop of regulator, perception and machine, from the car's motion to the machine's accelerations."""
     n = len(problem.a)
     inner, forward = gain[:, :n], gain[:, n:]
     return StateSpace(
         problem.a - problem.b @ inner, problem.e - problem.b @ forward, -inner, -np.asarray(forward)
     )
-
-
-# The four channels of the optimal washout as linear-quadratic problems.
-#
-# Surge with pitch and sway with roll, where a tilt stands in for a force; heave; yaw. Perception sees the
-# difference of car and machine, so one set of its states is enough: the filters are linear.
 
 
 Block = tuple[Matrix, Matrix, Matrix, Matrix]
@@ -262,11 +259,11 @@ def plane(
     axis: int,
     sign: float,
     bandwidth: tuple[float, float],
-) -> Problem:
+) -> ChannelProblem:
     """Surge and pitch (axis 1, sign 1) or sway and roll (axis 0, sign -1).
 
-    u = [tilt acceleration, acceleration], w = [angular velocity, specific force], felt force
-    x'' + sign g tilt. y = [sensed rate, sensed force, integral, displacement, velocity, tilt rate, u].
+    u = [tilt acceleration, acceleration], w = [angular velocity, specific force], specific force
+    x'' + sign g tilt. y = [perceived rate, perceived force, integral, displacement, velocity, tilt rate, u].
 
     Args:
         w: Weights.
@@ -288,7 +285,7 @@ def plane(
     c, d, h = np.zeros((8, PLANE_STATES)), np.zeros((8, 2)), np.zeros((8, 2))
     c[0, :3], h[0, 0] = canal[2][0], canal[3][0, 0]
     c[1, 3:5], h[1, 1] = otolith[2][0], otolith[3][0, 0]
-    # What perception sees is the car's motion less the machine's.
+    # Perception is driven by the car's motion less the machine's.
     for rows, inputs in ((a, e), (c, h)):
         rows[:, TILT_RATE] -= inputs[:, 0]
         rows[:, TILT] -= sign * GRAVITY * inputs[:, 1]
@@ -296,13 +293,13 @@ def plane(
     d[:, 1] -= h[:, 1]
     c[2, 5] = c[3, DISPLACEMENT] = c[4, VELOCITY] = c[5, TILT_RATE] = d[6, 0] = d[7, 1] = 1.0
     sizes = (w.sensed_rate, w.sensed_force, w.integral, w.displacement, w.velocity, w.tilt_rate)
-    return Problem(
+    return ChannelProblem(
         a, b, e, c, d, h, _weights(*sizes, w.tilt_acceleration, w.acceleration), np.array(bandwidth)
     )
 
 
-def heave(w: HeaveWeights, otoliths: Otoliths, bandwidth: float) -> Problem:
-    """Heave: u = acceleration, w = specific force; y = [sensed force, integral, position, velocity, u]."""
+def heave(w: HeaveWeights, otoliths: Otoliths, bandwidth: float) -> ChannelProblem:
+    """Heave: u = acceleration, w = specific force; y = [perceived force, integral, position, velocity, u]."""
     otolith = _state_space(*otoliths.transfer_function())
     a = linalg.block_diag(otolith[0], np.zeros((3, 3)))
     a[2, LINE_POSITION] = a[LINE_POSITION, LINE_VELOCITY] = 1.0
@@ -313,11 +310,11 @@ def heave(w: HeaveWeights, otoliths: Otoliths, bandwidth: float) -> Problem:
     h = np.array([[otolith[3][0, 0]], [0.0], [0.0], [0.0], [0.0]])
     d = -h + np.eye(5)[:, [4]]
     q = _weights(w.sensed_force, w.integral, w.displacement, w.velocity, w.acceleration)
-    return Problem(a, b, e, c, d, h, q, np.array([bandwidth]))
+    return ChannelProblem(a, b, e, c, d, h, q, np.array([bandwidth]))
 
 
-def yaw(w: YawWeights, canals: Canals, bandwidth: float) -> Problem:
-    """Yaw: u = angular acceleration, w = angular velocity. y = [sensed rate, angle, rate, u]."""
+def yaw(w: YawWeights, canals: Canals, bandwidth: float) -> ChannelProblem:
+    """Yaw: u = angular acceleration, w = angular velocity. y = [perceived rate, angle, rate, u]."""
     canal = _state_space(*canals.transfer_function(2))
     a = linalg.block_diag(canal[0], np.zeros((2, 2)))
     e = np.vstack([canal[1], np.zeros((2, 1))])
@@ -329,7 +326,7 @@ def yaw(w: YawWeights, canals: Canals, bandwidth: float) -> Problem:
     h = np.array([[canal[3][0, 0]], [0.0], [0.0], [0.0]])
     c[0, LINE_VELOCITY] -= h[0, 0]
     d = np.eye(4)[:, [3]]
-    return Problem(
+    return ChannelProblem(
         a, b, e, c, d, h, _weights(w.sensed_rate, w.angle, w.rate, w.acceleration), np.array([bandwidth])
     )
 
@@ -337,9 +334,6 @@ def yaw(w: YawWeights, canals: Canals, bandwidth: float) -> Problem:
 def _weights(*sizes: float) -> Matrix:
     """Bryson's rule: a quantity at its size costs 1."""
     return np.asarray(sizes, dtype=np.float64) ** -2
-
-
-# From weights to the filters of the optimal washout.
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,10 +347,10 @@ class Design:
         yaw: Yaw.
     """
 
-    surge: Solution
-    sway: Solution
-    heave: Solution
-    yaw: Solution
+    surge: Regulator
+    sway: Regulator
+    heave: Regulator
+    yaw: Regulator
 
 
 def design(p: OptimalParameters) -> Design:
@@ -369,10 +363,10 @@ def design(p: OptimalParameters) -> Design:
     canals, otoliths = model.canals, model.otoliths
     bandwidth = p.rate_bandwidth, p.force_bandwidth
     return Design(
-        solve(plane(p.surge, canals, otoliths, 1, 1.0, bandwidth)),
-        solve(plane(p.sway, canals, otoliths, 0, -1.0, bandwidth)),
-        solve(heave(p.heave, otoliths, p.force_bandwidth)),
-        solve(yaw(p.yaw, canals, p.rate_bandwidth)),
+        optimal_regulator(plane(p.surge, canals, otoliths, 1, 1.0, bandwidth)),
+        optimal_regulator(plane(p.sway, canals, otoliths, 0, -1.0, bandwidth)),
+        optimal_regulator(heave(p.heave, otoliths, p.force_bandwidth)),
+        optimal_regulator(yaw(p.yaw, canals, p.rate_bandwidth)),
     )
 
 

@@ -24,7 +24,7 @@ from ....envs.platform.kernels.geometry import (
     rate_matrix_inverse,
     rotation,
 )
-from ..kernels.blocks import Memory, Parameters, Reading, Rotation, command_axes, initial_memory, led_back
+from ..kernels.blocks import Memory, Parameters, Reading, Rotation, anti_windup, command_axes, initial_memory
 from ..kernels.step import (
     advance_rotation,
     advance_translation,
@@ -130,7 +130,7 @@ def line_after(p: Line, x: vec5, w: real) -> vec5:
 
 @wp.func
 def plane_at(x: vec10, moved: real, moved_rate: real, tilt: real, tilt_rate: real) -> vec10:
-    """A filter whose machine stands there."""
+    """A filter with the machine at a given place."""
     out = x
     out[wp.static(DISPLACEMENT)] = moved
     out[wp.static(VELOCITY)] = moved_rate
@@ -141,7 +141,7 @@ def plane_at(x: vec10, moved: real, moved_rate: real, tilt: real, tilt_rate: rea
 
 @wp.func
 def line_at(x: vec5, moved: real, moved_rate: real) -> vec5:
-    """The same of heave or yaw."""
+    """A filter of heave or yaw with the machine at a given place."""
     out = x
     out[wp.static(LINE_POSITION)] = moved
     out[wp.static(LINE_VELOCITY)] = moved_rate
@@ -149,7 +149,7 @@ def line_at(x: vec5, moved: real, moved_rate: real) -> vec5:
 
 
 @wp.func
-def in_space(force: vec3, psi: real) -> vec2:
+def to_inertial(force: vec3, psi: real) -> vec2:
     """Horizontal force turned from the cab's heading into F_I."""
     s = wp.sin(psi)
     c = wp.cos(psi)
@@ -178,10 +178,10 @@ def cab_velocity(p: Parameters, m: Memory, r: Rotation) -> vec3:
 
 
 @wp.func
-def located(p: Parameters, m: OptimalMemory) -> OptimalMemory:
-    """All filters with the machine where the references are.
+def synchronized(p: Parameters, m: OptimalMemory) -> OptimalMemory:
+    """All filters with the machine at the references.
 
-    Without a limit they have it there themselves, but for products of small angles, which would add up.
+    Without a limit they agree by themselves but for products of small angles, which would add up.
     """
     frame = m.frame
     r = reference_rotation(p, frame)
@@ -196,43 +196,43 @@ def located(p: Parameters, m: OptimalMemory) -> OptimalMemory:
 
 
 @wp.func
-def initial_optimal_memory(p: OptimalKernelParameters, seen: Reading) -> OptimalMemory:
+def initial_optimal_memory(p: OptimalKernelParameters, now: Reading) -> OptimalMemory:
     """Filters at rest; home is where the cab begins."""
     m = OptimalMemory()
-    m.frame = initial_memory(p.frame, seen)
+    m.frame = initial_memory(p.frame, now)
     m.frame.home = cab_position(p.frame, m.frame, reference_rotation(p.frame, m.frame))
     return m
 
 
 @wp.func
 def optimal_washout(
-    p: OptimalKernelParameters, memory: OptimalMemory, seen: Reading, dt: real
+    p: OptimalKernelParameters, memory: OptimalMemory, now: Reading, dt: real
 ) -> OptimalCommand:
     """One step."""
-    m = located(p.frame, memory)
+    m = synchronized(p.frame, memory)
     frame = m.frame
     beta_s = cab_angles(p.frame, frame)
-    rates = rate_matrix_inverse(beta_s) * limited_rate_cue(p.frame, seen.rate)
-    force = limited_force(p.frame, seen.force) + gravity()
-    level = in_space(force, beta_s[2])
+    rates = rate_matrix_inverse(beta_s) * limited_rate_cue(p.frame, now.rate)
+    force = limited_force(p.frame, now.force) + gravity()
+    level = to_inertial(force, beta_s[2])
     surge = plane_output(p.surge, m.surge, vec2(rates[1], level[0]))
     sway = plane_output(p.sway, m.sway, vec2(rates[0], level[1]))
     zero = real(0.0)
     alpha = vec3(zero, zero, line_output(p.yaw, m.yaw, rates[2]))
     tilt = vec2(sway[0], surge[0])
     r = split(p.frame, frame, alpha, tilt)
-    # The filters say how the cab moves; the hexapod's rotation moves it, too.
-    wanted = vec3(surge[1], sway[1], line_output(p.heave, m.heave, force[2]))
-    q = wanted - rotation(r.beta) * cab_relative_acceleration(p.frame, r)
+    # The filters command the cab's motion, of which the hexapod's rotation already makes a part.
+    cab_acceleration = vec3(surge[1], sway[1], line_output(p.heave, m.heave, force[2]))
+    q = cab_acceleration - rotation(r.beta) * cab_relative_acceleration(p.frame, r)
     c = carriage_acceleration(p.frame, frame, dt)
 
     moved = advance_translation(frame, q, c, dt)
     moved = advance_rotation(p.frame, moved, vec3(zero, zero, zero), alpha, tilt, dt)
     out = OptimalCommand()
-    out.memory.frame = led_back(p.frame, frame, seen, r, moved, dt)
+    out.memory.frame = anti_windup(p.frame, frame, now, r, moved, dt)
     out.memory.surge = plane_after(p.surge, m.surge, vec2(rates[1], level[0]))
     out.memory.sway = plane_after(p.sway, m.sway, vec2(rates[0], level[1]))
     out.memory.heave = line_after(p.heave, m.heave, force[2])
     out.memory.yaw = line_after(p.yaw, m.yaw, rates[2])
-    out.action = command_axes(p.frame, frame, seen, r, q, c)
+    out.action = command_axes(p.frame, frame, now, r, q, c)
     return out

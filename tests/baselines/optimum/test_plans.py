@@ -157,9 +157,9 @@ def test_windows_of_what_is_perceived_know_what_was_felt_before():
 def test_windows_cover_every_step_once_and_begin_at_nodes(steps, node, window, share):
     options = OptimumOptions(steps=node, window=window, keep=share * window)
     cut = list(windows(steps, options, DT))
-    assert [part.first for part in cut] == [0, *(part.kept for part in cut[:-1])]
-    assert cut[-1].kept == cut[-1].last == steps
-    assert all(part.first % node == 0 and part.first < part.kept <= part.last for part in cut)
+    assert [part.first for part in cut] == [0, *(part.applied for part in cut[:-1])]
+    assert cut[-1].applied == cut[-1].last == steps
+    assert all(part.first % node == 0 and part.first < part.applied <= part.last for part in cut)
 
 
 @pytest.mark.parametrize("name", ["24-inch", "dim-hexapod", "nads-1"])

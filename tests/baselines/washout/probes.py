@@ -8,9 +8,9 @@ import warp as wp
 from motion_cueing.baselines.washout.kernels.blocks import (
     HighPassParameters,
     high_pass,
+    integrated,
     limited_tilt,
     low_pass,
-    moved,
 )
 from motion_cueing.envs.arrays import real, vec2, vec3
 
@@ -26,7 +26,7 @@ def _high_pass(
     s = vec2()
     for k in range(u.shape[0]):
         a = high_pass(block, s[0], s[1], u[k], dt)
-        s = moved(s[0], s[1], a, dt)
+        s = integrated(s[0], s[1], a, dt)
         out[k] = vec3(s[0], s[1], a)
 
 
@@ -35,7 +35,7 @@ def _low_pass(w: real, damping: real, dt: real, u: wp.array(dtype=real), out: wp
     s = vec2()
     for k in range(u.shape[0]):
         a = low_pass(w, damping, s[0], s[1], u[k], dt)
-        s = moved(s[0], s[1], a, dt)
+        s = integrated(s[0], s[1], a, dt)
         out[k] = vec3(s[0], s[1], a)
 
 
@@ -44,7 +44,7 @@ def _tilt(limits: vec2, dt: real, target: wp.array(dtype=vec2), out: wp.array(dt
     s = vec2()
     for k in range(target.shape[0]):
         a = limited_tilt(s[0], s[1], target[k][0], target[k][1], real(10.0), limits[0], limits[1], dt)
-        s = moved(s[0], s[1], a, dt)
+        s = integrated(s[0], s[1], a, dt)
         out[k] = vec3(s[0], s[1], a)
 
 

@@ -20,7 +20,15 @@ from motion_cueing.baselines.washout.optimal import (
     OptimalWashout,
     PlaneWeights,
 )
-from motion_cueing.baselines.washout.optimal.design import Problem, design, discrete, heave, plane, solve, yaw
+from motion_cueing.baselines.washout.optimal.design import (
+    ChannelProblem,
+    design,
+    discrete,
+    heave,
+    optimal_regulator,
+    plane,
+    yaw,
+)
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.perception import get_vestibular_model
@@ -37,7 +45,7 @@ SPACE = WashoutSpace(START)
 OPEN = replace(START, force_scale=(1.0,) * 3, rate_scale=(1.0,) * 3)
 
 
-def problems(p: OptimalParameters) -> dict[str, Problem]:
+def problems(p: OptimalParameters) -> dict[str, ChannelProblem]:
     model = get_vestibular_model(p.vestibular)
     bandwidth = p.rate_bandwidth, p.force_bandwidth
     return {
@@ -68,7 +76,7 @@ def test_the_solution_of_the_riccati_equation(channel, vestibular):
     a, b, c = problem.joint
     q = np.diag(problem.q)
     r, s = problem.d.T @ q @ problem.d, c.T @ q @ problem.d
-    solved = solve(problem)
+    solved = optimal_regulator(problem)
     p, k = solved.riccati, solved.gain
     terms = (a.T @ p, p @ a, c.T @ q @ c, (p @ b + s) @ np.linalg.solve(r, b.T @ p + s.T))
     residual = terms[0] + terms[1] + terms[2] - terms[3]
@@ -89,7 +97,7 @@ def test_the_solution_of_the_riccati_equation(channel, vestibular):
         assert lyapunov_cost(problem, factor * k, noise) > mean
 
 
-def lyapunov_cost(problem: Problem, gain: np.ndarray, noise: np.ndarray) -> float:
+def lyapunov_cost(problem: ChannelProblem, gain: np.ndarray, noise: np.ndarray) -> float:
     """Mean of y'Qy with u = -gain [z, w]: the covariance of the loop solves a Lyapunov equation."""
     a, b, c = problem.joint
     covariance = linalg.solve_continuous_lyapunov(a - b @ gain, -noise)
