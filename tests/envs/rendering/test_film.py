@@ -119,8 +119,8 @@ def test_what_is_no_film_is_refused(tmp_path):
         save_film(tmp_path / "a.gif", [], 10.0)
 
 
-@pytest.mark.parametrize("reference_cue", [1.0, 12.5, 15.0, 30.0, 100.0])
-def test_a_gif_lasts_whole_hundredths_and_no_less_than_two(wanted):
-    hundredths = 100.0 / gif_rate(wanted)
+@pytest.mark.parametrize("rate", [1.0, 12.5, 15.0, 30.0, 100.0])
+def test_a_gif_lasts_whole_hundredths_and_no_less_than_two(rate):
+    hundredths = 100.0 / gif_rate(rate)
     assert hundredths == pytest.approx(round(hundredths))
-    assert hundredths == pytest.approx(max(100.0 / wanted, 2.0), abs=0.5)
+    assert hundredths == pytest.approx(max(100.0 / rate, 2.0), abs=0.5)
