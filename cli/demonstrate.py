@@ -116,7 +116,7 @@ def _sources(command: DemonstrateCommand) -> dict[str, CueSource]:
 def _random_sources(command: DemonstrateCommand) -> Iterator[tuple[str, CueSource]]:
     from functools import partial
 
-    from ..envs.maneuvers.random_drives import RandomDrives, drive_seeds, random_drive
+    from ..envs.maneuvers.sampling import RandomDrives, drive_seeds, random_drive
 
     for seed in drive_seeds(command.random, command.seed):
         name = RandomDrives().plan(seed, command.duration).name

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..baselines.policy import Policy
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE
+from ..envs.task import ActionOptions, TaskOptions
 from ..envs.task.batch import Batch
 from ..envs.task.environment import normalized
 from ..envs.task.kernels.reward import N_TERMS, TERMS
-from ..envs.task.options import ActionOptions, TaskOptions
 from .agents.base_policy import base_policy
 from .config import TrainingConfig, validation_task
 

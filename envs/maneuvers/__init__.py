@@ -13,7 +13,7 @@ from .registry import describe_maneuver, get_maneuver, maneuver_names, register
 
 if TYPE_CHECKING:
     from .maneuver import Maneuver
-    from .random_drives import RandomDrives, drive_seeds, random_drive, random_drives
+    from .sampling import RandomDrives, drive_seeds, random_drive, random_drives
 
 __all__ = [
     "Maneuver",
@@ -34,5 +34,5 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = "maneuver" if name == "Maneuver" else "random_drives"
+    module = "maneuver" if name == "Maneuver" else "sampling"
     return getattr(import_module(f"{__name__}.{module}"), name)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from ..errors import UnknownNameError
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..perception.models import vestibular_model_names
 from ..platform.machines import Platform
-from ..platform.presets import ablation_names, platform_names
+from ..platform.presets import ablation_names, load_platform, platform_names
 from ..platform.randomization import PlatformRanges
 from ..settings import NonNegative, Positive, Vector2, configuration, renamed
 from .kernels.action import ActionOptions
@@ -102,12 +102,19 @@ class RandomizationOptions:
                 _check_range(name, getattr(self, name))
 
 
+def _from_file(platform: object) -> object:
+    """A platform given as the name of a YAML file, so that what is saved needs the file no more."""
+    if isinstance(platform, str) and platform.endswith((".yaml", ".yml")):
+        return load_platform(platform)
+    return platform
+
+
 @configuration
 class TaskOptions:
     """The whole environment.
 
     Args:
-        platform: The machine, or its name.
+        platform: The motion base, its name, or the name of a YAML file with its fields.
         vestibular: Perception model by name.
         observation: What is seen.
         action: What can be done.
@@ -116,7 +123,7 @@ class TaskOptions:
         randomization: What differs from episode to episode.
     """
 
-    platform: Platform | str = "paper"
+    platform: Annotated[Platform | str, BeforeValidator(_from_file)] = "paper"
     vestibular: str = "zacharias"
     observation: ObservationOptions = ObservationOptions()
     action: ActionOptions = ActionOptions()

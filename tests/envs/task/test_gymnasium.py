@@ -18,6 +18,8 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import motion_cueing.envs
 from motion_cueing.envs.errors import ActionError, ConfigurationError, UnknownNameError
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import from_dict, save, to_dict
 from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector, TaskOptions
 
 from .tasks import EVERY_OPTION, SHORT, drive, options
@@ -177,6 +179,15 @@ def test_a_batch_answers_for_each_of_its_environments():
     assert envs.call("action_of", scale)[1].tolist() == [1.0] * 9
     with pytest.raises(ConfigurationError, match=r"use reset\(\) of the vector environment"):
         envs.call("reset")
+
+
+def test_a_platform_can_be_a_file(tmp_path):
+    save(get_platform("nads-1"), tmp_path / "mine.yaml")
+    task = TaskOptions(platform=str(tmp_path / "mine.yaml"))
+    assert task.platform == get_platform("nads-1")
+    assert from_dict(TaskOptions, to_dict(task)) == task
+    with pytest.raises(ConfigurationError, match=r"'platform': .*other\.yaml: cannot be read"):
+        TaskOptions(platform=str(tmp_path / "other.yaml"))
 
 
 def test_the_version_is_that_of_the_distribution():

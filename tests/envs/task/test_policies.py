@@ -14,9 +14,8 @@ from motion_cueing.baselines.washout import HighPass, load_washout
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
-from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector
+from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector, RewardWeights
 from motion_cueing.envs.task.kernels.reward import N_TERMS, TERMS
-from motion_cueing.envs.task.options import RewardWeights
 from motion_cueing.evaluation import rollout
 
 from .tasks import drive
