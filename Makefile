@@ -58,11 +58,11 @@ bench: $(DEV) ## Measure speed; see docs/results/performance.md
 
 docs: $(DOCS) $(TYPES)/motion_cueing ## Build the documentation into build/site; a broken link or reference is a failure
 	@PYTHONPATH=$(TYPES) $(BIN)/python docs/generate.py
-	@$(BIN)/zensical build --strict --clean
+	@PYTHONPATH= $(BIN)/zensical build --strict --clean
 
 docs-serve: $(DOCS) $(TYPES)/motion_cueing ## Show the documentation at http://localhost:8000, and again at every change
 	@PYTHONPATH=$(TYPES) $(BIN)/python docs/generate.py
-	@$(BIN)/zensical serve
+	@PYTHONPATH= $(BIN)/zensical serve
 
 constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject.toml; UPGRADE=1 for newer versions
 	$(BIN)/python -m pip install -qq --disable-pip-version-check uv
