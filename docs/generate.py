@@ -15,6 +15,7 @@ import re
 import shutil
 import sys
 import tempfile
+import types
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -106,40 +107,6 @@ def fields_table(cls: type[Any]) -> str:
 # The environment.
 
 
-def observation_tables() -> dict[str, str]:
-    """Fixed rows, and the rows added by choice."""
-    from motion_cueing.envs.task import observation as rows
-
-    def lines(found: Iterable[Any], added: str | None) -> Iterator[tuple[object, ...]]:
-        for row in found:
-            start = (f"`{row.name}`", row.size, row.unit, f"{row.scale:g}", f"{row.bound:g}", row.meaning)
-            yield start if added is None else (*start, added)
-
-    header = ("row", "entries", "unit", "scale", "bound", "meaning")
-    fixed = [*rows.ROWS, *rows.DIFFERENCE, rows.last_action_row(9)]
-    choices = (
-        ([rows.COMMAND], '`action.mode` "jerk"'),
-        ([rows.BASE], '`action.mode` "residual"'),
-        ([rows.preview_row(1)], "`observation.preview`, six entries a sample"),
-        ([rows.memory_row(1)], "`observation.memory`, six entries a time constant"),
-        (rows.PERCEIVED, "`observation.perceived`"),
-        (rows.TRUE_MOTION, "`observation.true_motion`"),
-        ([*rows.MACHINE, rows.TRAVEL_USED], "`observation.machine`"),
-    )
-    chosen = [line for found, added in choices for line in lines(found, added)]
-    return {
-        "observation-rows": table(header, lines(fixed, None)),
-        "observation-choices": table((*header, "added by"), chosen),
-    }
-
-
-def reward_table() -> str:
-    """Terms of the reward with their default weights."""
-    from motion_cueing.envs.task.options import RewardWeights
-
-    return table(("term", "weight", "meaning"), field_rows(RewardWeights))
-
-
 def action_table() -> str:
     """What an action of 1 stands for on each machine."""
     from motion_cueing.envs.platform import get_platform, platform_names
@@ -160,36 +127,15 @@ def action_table() -> str:
     return table(header, [(f"`{name}`", *cells(name)) for name in platform_names()])
 
 
-# Metrics.
-
-
-def metric_tables() -> dict[str, str]:
-    """Metrics of a drive, of an axis and of an actuator, and the thresholds they are measured against."""
-    from motion_cueing.evaluation import metrics
-
-    kinds = {
-        "metrics-drive": metrics.Metrics,
-        "metrics-axis": metrics.AxisMetrics,
-        "metrics-actuator": metrics.ActuatorMetrics,
-    }
-    tables = {
-        name: table(
-            ("metric", "definition"), [(f"`{key}`", text) for key, text in argument_texts(cls).items()]
-        )
-        for name, cls in kinds.items()
-    }
-    return {**tables, "criteria": fields_table(metrics.Criteria)}
-
-
 # Files that people write.
 
 
 def configuration_tables() -> dict[str, str]:
     """Fields of machines, cars, washouts, predictive controllers, tasks and trainings."""
     from motion_cueing.baselines.mpc import MpcParameters
-    from motion_cueing.baselines.washout.adaptive.policy import AdaptiveParameters
-    from motion_cueing.baselines.washout.optimal.design import OptimalParameters
-    from motion_cueing.baselines.washout.parameters import WashoutParameters
+    from motion_cueing.baselines.washout import WashoutParameters
+    from motion_cueing.baselines.washout.adaptive import AdaptiveParameters
+    from motion_cueing.baselines.washout.optimal import OptimalParameters
     from motion_cueing.envs.car import Car
     from motion_cueing.envs.platform import Platform
     from motion_cueing.envs.task import TaskOptions
@@ -205,10 +151,9 @@ def configuration_tables() -> dict[str, str]:
     found = {f"fields-{name}": fields_table(cls) for name, cls in tables.items()}
     training = (row for row in field_rows(TrainingConfig) if not row[0].startswith("`task."))
     found["fields-training"] = table(("field", "default", "meaning"), training)
-    common = {f"`{item.name}`" for item in dataclasses.fields(WashoutParameters)}
+    common = {item.name for item in dataclasses.fields(WashoutParameters)}
     for name, cls in {"adaptive": AdaptiveParameters, "optimal": OptimalParameters}.items():
-        own = (row for row in field_rows(cls) if row[0].split(".")[0].strip("`") and row[0] not in common)
-        own = (row for row in own if f"`{row[0].strip('`').split('.')[0]}`" not in common)
+        own = (row for row in field_rows(cls) if row[0].strip("`").split(".")[0] not in common)
         found[f"fields-{name}"] = table(("field", "default", "meaning"), own)
     return found
 
@@ -246,10 +191,14 @@ def link_packages() -> None:
 
 def write_tables() -> None:
     """Fill ``build/generated``."""
+    from motion_cueing.envs.task.observation import observation_table
+    from motion_cueing.envs.task.reward import reward_table
+    from motion_cueing.evaluation.reporting.definitions import definitions
+
     texts = {
-        **observation_tables(),
-        **metric_tables(),
+        **definitions(),
         **configuration_tables(),
+        "observation-rows": observation_table(),
         "reward-terms": reward_table(),
         "action-scale": action_table(),
         "command-line": command_line(),
@@ -281,12 +230,11 @@ def python_blocks(page: Path) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.M | re.S)
 
 
-def run_page(page: Path, edit: Callable[[str], str] = lambda code: code) -> dict[str, object]:
-    """Run a page's Python in the current folder; returns its names."""
-    names: dict[str, object] = {"__name__": "page"}
+def run_page(page: Path, edit: Callable[[str], str] = lambda code: code) -> None:
+    """Run a page's Python in the current folder."""
+    module = sys.modules["page"] = types.ModuleType("page")  # dataclasses look their module up
     for block in python_blocks(page):
-        exec(compile(edit(block), page.name, "exec"), names)
-    return names
+        exec(compile(edit(block), page.name, "exec"), module.__dict__)
 
 
 def keep_pictures() -> None:

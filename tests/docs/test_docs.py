@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -179,18 +180,56 @@ def test_the_readme_is_short():
     assert len(text_of(ROOT / "README.md").split()) < 700
 
 
-def test_generated_tables_hold_what_the_code_declares():
-    from motion_cueing.envs.platform import Platform
-    from motion_cueing.envs.simulator.kernels.observation import ROWS
-    from motion_cueing.evaluation.metrics import Metrics
+def test_a_table_of_fields_has_every_field_with_its_default_and_meaning():
+    @dataclass(frozen=True)
+    class Inner:
+        """An inner one.
+
+        Args:
+            low: Least value, m.
+        """
+
+        low: float = 0.5
+
+    @dataclass(frozen=True)
+    class Outer:
+        """An outer one.
+
+        Args:
+            name: How it is
+                called.
+            inner: Its part, or None.
+        """
+
+        name: str
+        inner: Inner | None = None
 
     made = generate()
-    rows = made.observation_tables()["observation-rows"]
-    assert all(f"`{row.name}`" in rows for row in ROWS)
-    assert "`hexapod.upper_joints`" in made.fields_table(Platform)
-    # A value of every metric that a drive has is described.
-    described = made.metric_tables()["metrics-drive"]
-    assert all(f"`{name}`" in described for name in Metrics.__dataclass_fields__)
+    # Annotations as text are looked up in the module.
+    Outer.__annotations__ = {"name": str, "inner": Inner | None}
+    Inner.__annotations__ = {"low": float}
+    assert list(made.field_rows(Outer)) == [
+        ("`name`", "required", "How it is called."),
+        ("`inner`", "none", "Its part, or None."),
+        ("`inner.low`", "`0.5`", "Least value, m."),
+    ]
+
+
+def test_every_generated_table_of_a_page_is_made(tmp_path):
+    made = generate()
+    made.GENERATED = tmp_path / "generated"
+    made.write_tables()
+    shown = {name for page in PAGES for name in re.findall(r'--8<-- "([\w.-]+)"', text_of(page))}
+    assert shown == {path.name for path in made.GENERATED.iterdir()}
+    assert all(path.read_text(encoding="utf-8").startswith("| ") for path in made.GENERATED.iterdir())
+
+
+def test_tutorials_are_notebooks_too(tmp_path):
+    jupytext = pytest.importorskip("jupytext")
+    for page in generate().TUTORIALS:
+        notebook = jupytext.reads(text_of(page), fmt="md")
+        code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+        assert code == [block.rstrip("\n") for block in blocks(text_of(page), "python")]
 
 
 def test_the_citation_file_has_what_its_format_requires_and_the_version():
