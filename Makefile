@@ -15,14 +15,15 @@ TYPES := build/types
 # Stamps: a target that finds its stamp newer than the requirements installs nothing.
 BASE := $(VENV)/.installed-base
 DEV := $(VENV)/.installed-dev
+DOCS := $(VENV)/.installed-docs
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help evaluate paper test lint types unit format bench constraints clean distclean
+.PHONY: help evaluate paper test lint types unit format bench docs docs-serve constraints clean distclean
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 	@echo "  PYTHON=python3.12 chooses the interpreter of a new $(VENV), OUT=DIR where results go."
 
 evaluate: $(BASE) ## All maneuvers with the default policies, and the paper's cases: tables, figures, reports
@@ -52,8 +53,16 @@ format: $(DEV) ## Format the code and mend what ruff can mend
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(DEV) ## Measure speed; see docs/performance.md
+bench: $(DEV) ## Measure speed; see docs/results/performance.md
 	$(BIN)/python -m benchmarks.report
+
+docs: $(DOCS) $(TYPES)/motion_cueing ## Build the documentation into build/site; a broken link or reference is a failure
+	@PYTHONPATH=$(TYPES) $(BIN)/python docs/generate.py
+	@PYTHONPATH= $(BIN)/zensical build --strict --clean
+
+docs-serve: $(DOCS) $(TYPES)/motion_cueing ## Show the documentation at http://localhost:8000, and again at every change
+	@PYTHONPATH=$(TYPES) $(BIN)/python docs/generate.py
+	@PYTHONPATH= $(BIN)/zensical serve
 
 constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject.toml; UPGRADE=1 for newer versions
 	$(BIN)/python -m pip install -qq --disable-pip-version-check uv
@@ -90,3 +99,10 @@ $(DEV): pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing into $(VENV), with the tools of development"
 	@$(PIP) -e '.[dev,train]'
 	@touch $(BASE) $@
+
+$(DOCS): pyproject.toml constraints.txt | $(BIN)/python
+	@$(BIN)/python -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "make: the documentation's tools need Python 3.11 or newer; name one with PYTHON=... VENV=..." >&2; exit 1; }
+	@echo "Installing into $(VENV), with the tools of the documentation"
+	@$(PIP) -e '.[docs,optimal,train]'
+	@touch $@

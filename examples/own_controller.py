@@ -1,7 +1,7 @@
 """A controller of your own: tilts the driver for lasting accelerations, and shoves him for short ones.
 
 Run it with ``python examples/own_controller.py``, with names of maneuvers if you like;
-docs/bring-your-own-controller.md explains it.
+docs/guides/add-a-controller.md explains it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TIME_STEP = 0.01
 
 @dataclass
 class TiltAndShove:
-    """Splits the wanted force by frequency: below it tilts the cab, above it moves the carriage.
+    """Splits the reference force by frequency: below it tilts the cab, above it moves the carriage.
 
     Args:
         crossover: Frequency of the split, rad/s.
@@ -52,9 +52,9 @@ class TiltAndShove:
         action = np.zeros((len(observation), 9))
         action[:, :2] = self._home(force - slow, observation)
         # Nose up, gravity pushes the driver into the seat back: f_x = g sin(pitch), f_y = -g sin(roll).
-        wanted = np.stack([-slow[:, 1], slow[:, 0]], axis=1) / GRAVITY
+        target = np.stack([-slow[:, 1], slow[:, 0]], axis=1) / GRAVITY
         angle, rate = read(observation, "beta")[:, :2], read(observation, "beta_rate")[:, :2]
-        action[:, 5:7] = self.tilt**2 * (wanted - angle) - 2.0 * self.tilt * rate
+        action[:, 5:7] = self.tilt**2 * (target - angle) - 2.0 * self.tilt * rate
         return action, slow
 
     def _home(self, fast: NDArray[Any], observation: NDArray[Any]) -> NDArray[Any]:

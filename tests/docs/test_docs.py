@@ -1,0 +1,239 @@
+"""The documentation: its code runs, its commands exist, its links lead somewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from motion_cueing.cli.main import COMMANDS, main
+from motion_cueing.evaluation.provenance import package_version
+
+from ..car import synthetic_log
+from ..repository import ROOT
+from ..train import agents
+
+DOCS = ROOT / "docs"
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
+FOLDERS = (
+    "baselines",
+    "benchmarks",
+    "cli",
+    "docs",
+    "envs",
+    "evaluation",
+    "examples",
+    "realtime",
+    "tests",
+    "train",
+)
+SMALL = {
+    "STEPS = 2_000_000": "STEPS = 16_384",
+    '"library": 128': '"library": 2',
+    '"net_arch": [128, 128]': '"net_arch": [8]',
+}
+"""What makes the training of a tutorial a matter of seconds."""
+
+
+def generate():
+    """The script that makes generated tables and notebooks."""
+    spec = importlib.util.spec_from_file_location("generate", DOCS / "generate.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """Fenced blocks of a language; "" for those without one."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def commands(text: str) -> list[list[str]]:
+    """Words of every ``motion-cueing`` call in blocks and in passing, continued lines joined."""
+    lines = [line for block in blocks(text, "") for line in block.replace("\\\n", " ").splitlines()]
+    lines += re.findall(r"`(motion-cueing [^`]+)`", text)
+    return [shlex.split(line, comments=True) for line in lines if line.startswith("motion-cueing ")]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the log and the agent that the examples speak of."""
+    truth = synthetic_log.drive()
+    log = synthetic_log.Device(pitch=0.1, yaw=0.2).records(truth)
+    log["t"], log["ay"], log["gps_speed"] = 1000.0 * log["t"], -log["ay"], 3.6 * log["v"]
+    synthetic_log.write(tmp_path / "drive.csv", log)
+    agents.agent().save(tmp_path / "runs" / "first" / "best.safetensors")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(text_of(p), "python")],
+                         ids=lambda page: page.relative_to(ROOT).as_posix())  # fmt: skip
+def test_python_runs(page, folder):
+    def smaller(code: str) -> str:
+        for large, small in SMALL.items():
+            code = code.replace(large, small)
+        return code
+
+    generate().run_page(page, smaller)
+    shown = re.findall(r"\]\(images/(\d-[\w.-]+)\)", text_of(page))
+    assert [name for name in shown if not (folder / name).exists()] == []
+
+
+def test_small_trainings_are_in_the_tutorial():
+    text = text_of(DOCS / "tutorials" / "2-train.md")
+    assert [large for large in SMALL if large not in text] == []
+
+
+def test_the_first_example_scores_better_than_standing_still(folder, capsys):
+    exec("\n".join(blocks(text_of(ROOT / "README.md"), "python")), {"__name__": "page"})
+    # J of no motion in the lane change is 1.7.
+    assert 0.0 < float(capsys.readouterr().out) < 1.5
+
+
+def test_the_import_of_the_example_finds_the_drive(folder):
+    names: dict[str, object] = {}
+    for block in blocks(text_of(DOCS / "guides" / "import-a-log.md"), "python"):
+        exec(block, names)
+    found = names["imported"].trace.specific_force
+    truth = synthetic_log.drive()
+    force = np.stack([np.interp(np.arange(len(found)) * 0.01, truth.time, f) for f in truth.force.T], axis=1)
+    assert np.abs(found - force)[100:-100].max() < 0.1
+
+
+def test_links_and_pictures_lead_somewhere():
+    """What `make docs` finds in links between pages, and pictures and files of the repository besides."""
+    broken = []
+    for page in PAGES:
+        targets = re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text_of(page), flags=re.S))
+        local = [target.split("#")[0] for target in targets if "://" not in target and target[0] != "#"]
+        made = {".ipynb"}  # notebooks are made from the pages
+        broken += [
+            f"{page.relative_to(ROOT)}: {target}"
+            for target in local
+            if Path(target).suffix not in made and not (page.parent / target).exists()
+        ]
+    assert broken == []
+
+
+def test_files_and_make_targets_exist():
+    makefile = text_of(ROOT / "Makefile")
+    missing = []
+    for page in PAGES:
+        text = text_of(page)
+        named = re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w/.-]+)`", text)
+        missing += [f"{page.name}: {name}" for name in named if not (ROOT / name).exists()]
+        targets = set(re.findall(r"`make ([a-z]+)[^`]*`", text)) | set(
+            re.findall(r"^make ([a-z]+)", text, re.M)
+        )
+        missing += [
+            f"{page.name}: make {target}"
+            for target in targets
+            if not re.search(rf"^{target}:", makefile, re.M)
+        ]
+    assert missing == []
+
+
+def test_commands_and_their_options_exist(capsys):
+    used: dict[str, set[str]] = {}
+    for page in PAGES:
+        for _, *words in commands(text_of(page)):
+            if words and not words[0].startswith("-") and not words[0].isupper():
+                used.setdefault(words[0], set()).update(w.split("=")[0] for w in words if w.startswith("--"))
+    wrong = []
+    for name, options in used.items():
+        if name not in COMMANDS:
+            wrong.append(name)
+            continue
+        assert main([name, "--help"]) == 0
+        known = set(re.findall(r"--[a-z][a-z0-9-]*", capsys.readouterr().out))
+        wrong += [f"{name} {option}" for option in sorted(options - known)]
+    assert wrong == []
+
+
+def test_the_site_shows_every_page():
+    """The navigation of the site names each page, and only pages that exist."""
+    text = text_of(ROOT / "mkdocs.yml")
+    named = set(re.findall(r"([\w/.-]+\.md)\s*$", text, re.M))
+    assert named == {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+
+
+def test_every_folder_of_pages_has_an_index_that_names_them():
+    for index in DOCS.glob("*/index.md"):
+        text = text_of(index)
+        pages = {page.name for page in index.parent.glob("*.md")} - {"index.md"}
+        assert {page for page in pages if f"({page})" not in text} == set(), index
+
+
+def test_the_readme_is_short():
+    assert len(text_of(ROOT / "README.md").split()) < 700
+
+
+def test_a_table_of_fields_has_every_field_with_its_default_and_meaning():
+    @dataclass(frozen=True)
+    class Inner:
+        """An inner one.
+
+        Args:
+            low: Least value, m.
+        """
+
+        low: float = 0.5
+
+    @dataclass(frozen=True)
+    class Outer:
+        """An outer one.
+
+        Args:
+            name: How it is
+                called.
+            inner: Its part, or None.
+        """
+
+        name: str
+        inner: Inner | None = None
+
+    made = generate()
+    # Annotations as text are looked up in the module.
+    Outer.__annotations__ = {"name": str, "inner": Inner | None}
+    Inner.__annotations__ = {"low": float}
+    assert list(made.field_rows(Outer)) == [
+        ("`name`", "required", "How it is called."),
+        ("`inner`", "none", "Its part, or None."),
+        ("`inner.low`", "`0.5`", "Least value, m."),
+    ]
+
+
+def test_every_generated_table_of_a_page_is_made(tmp_path):
+    made = generate()
+    made.GENERATED = tmp_path / "generated"
+    made.write_tables()
+    shown = {name for page in PAGES for name in re.findall(r'--8<-- "([\w.-]+)"', text_of(page))}
+    assert shown == {path.name for path in made.GENERATED.iterdir()}
+    assert all(path.read_text(encoding="utf-8").startswith("| ") for path in made.GENERATED.iterdir())
+
+
+def test_tutorials_are_notebooks_too(tmp_path):
+    jupytext = pytest.importorskip("jupytext")
+    for page in generate().TUTORIALS:
+        notebook = jupytext.reads(text_of(page), fmt="md")
+        code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+        assert code == [block.rstrip("\n") for block in blocks(text_of(page), "python")]
+
+
+def test_the_citation_file_has_what_its_format_requires_and_the_version():
+    citation = yaml.safe_load(text_of(ROOT / "CITATION.cff"))
+    assert {"cff-version", "message", "title", "authors"} <= citation.keys()
+    assert all("name" in author for author in citation["authors"])
+    assert citation["version"] == package_version()
