@@ -232,15 +232,15 @@ def _register_own() -> None:
         "mpc": "predictive control that knows nothing of the drive ahead",
         "mpc-preview": "predictive control that sees 2 s of the drive ahead",
         "mpc-full": "predictive control that knows the drive over its whole horizon, 8 s",
-        "nmpc": "nonlinear predictive control that knows nothing of the drive ahead",
-        "nmpc-preview": "nonlinear predictive control that sees 2 s of the drive ahead",
+        "nmpc": "mpc with exact equations, solved until it converges",
+        "nmpc-preview": "mpc-preview with exact equations, solved until it converges",
     }.items():
         register(name, partial(_mpc, name), about)
     register(
         "optimum", partial(_optimum, "J"), "the least J there is: the whole drive known, its motion planned"
     )
     register("optimum-perceived", partial(_optimum, "perceived"), "the same for the least perceived J")
-    for family in (".", "adaptive", "optimal"):
+    for family in (".", "classical", "adaptive", "optimal"):
         folder = Path(__file__).parent / "washout" / family / "presets"
         for name in preset_names(folder):
             register(name, partial(_washout, name), _description(folder / f"{name}.yaml"))
