@@ -181,7 +181,7 @@ class TrainingConfig:
 
 
 def validation_task(config: TrainingConfig) -> TaskOptions:
-    """The environment of the validation drives, on machines of their own where builds are drawn."""
+    """The environment of the validation drives, on machines of their own where the platform is randomized."""
     given, build = config.validation, config.task.randomization.build
     episode = EpisodeOptions(
         random=config.task.episode.random,

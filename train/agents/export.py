@@ -42,7 +42,7 @@ class ExportError(MotionCueingError, RuntimeError):
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export was found to be.
+    """Accuracy, speed and size of an export.
 
     Args:
         torch_difference: Largest difference of an action from PyTorch's.
@@ -138,7 +138,7 @@ def metadata(agent: Agent) -> dict[str, str]:
 
 
 def abilities_of(agent: Agent) -> dict[str, list[float]]:
-    """What an agent that is told its machine sees of it, in SI units; nothing for any other."""
+    """Abilities of the machine that an agent for any machine observes, in SI units; empty for any other."""
     if not agent.told:
         return {}
     return {name: values.tolist() for name, values in abilities(agent.platform).items()}

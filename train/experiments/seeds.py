@@ -177,10 +177,10 @@ class Place:
 def kind_of(path: Path) -> str | None:
     """Which kind of several trainings a folder holds; None where it is one training."""
     kinds = {"search": is_search, "seeds": is_seeds, "population": is_population}
-    found = next((kind for kind, holds in kinds.items() if holds(path)), None)
-    if found == "search":
+    kind = next((kind for kind, holds in kinds.items() if holds(path)), None)
+    if kind == "search":
         raise DataError(f"--resume {path}: a search; say with --search how many trainings there shall be")
-    return found
+    return kind
 
 
 def run_training(folder: RunFolder, place: Place) -> int:
@@ -227,10 +227,10 @@ def run_search(search: Search, trials: int, place: Place) -> int:
 def run_seeds(seeds: Seeds, place: Place) -> int:
     """Several seeds; returns the exit status."""
     with place.open() as (engine, progress):
-        found, interrupted = seeds.run(engine, progress)
+        results, interrupted = seeds.run(engine, progress)
     if interrupted:
         return _stopped(f"train --out {seeds.path}{place.words}")
-    print(f"{seeds.path}: {summary(found)}")
+    print(f"{seeds.path}: {summary(results)}")
     return _SUCCESS
 
 
