@@ -138,7 +138,7 @@ def metadata(agent: Agent) -> dict[str, str]:
 
 
 def abilities_of(agent: Agent) -> dict[str, list[float]]:
-    """Abilities of the machine that an agent for any machine observes, in SI units; empty for any other."""
+    """What an agent that is told its machine sees of it, in SI units; nothing for any other."""
     if not agent.told:
         return {}
     return {name: values.tolist() for name, values in abilities(agent.platform).items()}

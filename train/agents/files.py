@@ -167,6 +167,9 @@ def _bias(k: int) -> str:
     return f"layers.{k}.bias"
 
 
+# An agent's file: safetensors with one entry of metadata, JSON with version and checksum.
+
+
 SUFFIX: Final = ".safetensors"
 
 FORMAT: Final = 1
