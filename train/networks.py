@@ -65,10 +65,9 @@ def linear_layers(modules: Iterable[nn.Module]) -> list[nn.Linear]:
     return [module for module in modules if isinstance(module, nn.Linear)]
 
 
-def weights_of(layers: Iterable[nn.Linear]) -> dict[str, tuple[Floats, ...]]:
-    """Arguments ``weights`` and ``biases`` of a :class:`~.agents.Network`."""
-    pairs = [(_numpy(layer.weight), _numpy(layer.bias)) for layer in layers]
-    return {"weights": tuple(weight for weight, _ in pairs), "biases": tuple(bias for _, bias in pairs)}
+def weights_of(layers: Sequence[nn.Linear]) -> tuple[tuple[Floats, ...], tuple[Floats, ...]]:
+    """Weights and biases, the first arguments of a :class:`~.agents.Network`."""
+    return tuple(_numpy(layer.weight) for layer in layers), tuple(_numpy(layer.bias) for layer in layers)
 
 
 @torch.no_grad()
@@ -175,7 +174,7 @@ class Actor(nn.Module):
         plain = copy.deepcopy(self)
         plain._fold_normalization()
         activation: Any = self.latent.activation
-        return Network(**weights_of(plain.layers), activation=activation, squash="tanh", skip=True)
+        return Network(*weights_of(plain.layers), activation=activation, squash="tanh", skip=True)
 
     def load(self, network: Network) -> None:
         """Take over the weights of a network.

@@ -64,7 +64,7 @@ class TrainingProgress:
         """Where the one training is."""
         self._show("training", status, "")
 
-    def told(self, job: Job, status: Status) -> None:
+    def update(self, job: Job, status: Status) -> None:
         """Where a job is."""
         self._show(job.name, status, f"{job.name}: ")
 

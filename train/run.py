@@ -230,6 +230,11 @@ class RunFolder:
         return read_checkpoint(found[-1]) if found else None
 
 
+def is_training(path: Path) -> bool:
+    """Whether a folder is that of one training."""
+    return (path / _RECORD).exists()
+
+
 def free_folder(path: Path | None, name: str) -> Path:
     """A folder without anything in it: the one given, or the next of ``runs/NAME-1``, -2...
 

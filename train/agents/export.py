@@ -42,7 +42,7 @@ class ExportError(MotionCueingError, RuntimeError):
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export was found to be.
+    """Accuracy, speed and size of an export.
 
     Args:
         torch_difference: Largest difference of an action from PyTorch's.

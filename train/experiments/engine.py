@@ -86,7 +86,7 @@ Source = Callable[[], Job | None]
 class Listener(Protocol):
     """Follows jobs, in the process that runs the engine."""
 
-    def told(self, job: Job, status: Status) -> bool | None:
+    def update(self, job: Job, status: Status) -> bool | None:
         """Where a job is; True stops it at its next boundary."""
         ...
 
@@ -123,7 +123,7 @@ class Engine:
             while not interrupt.asked and (job := source()) is not None:
 
                 def report(status: Status, job: Job = job) -> bool:
-                    return bool(listener.told(job, status)) or interrupt.asked
+                    return bool(listener.update(job, status)) or interrupt.asked
 
                 listener.ended(job, ending_of(job, report))
         return interrupt.asked
@@ -144,7 +144,7 @@ class _Endings:
     """Keeps how jobs ended, and passes everything on."""
 
     def __init__(self, listener: Listener) -> None:
-        self.told, self._listener = listener.told, listener
+        self.update, self._listener = listener.update, listener
         self.found: dict[str, Ending] = {}
 
     def ended(self, job: Job, ending: Ending) -> None:
@@ -219,7 +219,7 @@ class _Workers(Engine, ABC):
                 done, _ = wait(running, _PATIENCE, FIRST_COMPLETED)
                 jobs = {job.name: job for job in running.values()}
                 for name, report in self._collect(jobs.keys() if interrupt.asked else stopped):
-                    if name in jobs and listener.told(jobs[name], pickle.loads(report)):
+                    if name in jobs and listener.update(jobs[name], pickle.loads(report)):
                         stopped.add(name)
                 for future in done:
                     job = running.pop(future)

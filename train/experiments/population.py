@@ -105,10 +105,10 @@ def _drawn(choice: Choice, random: np.random.Generator) -> Any:
     low, high = choice.low or 0.0, choice.high or 0.0
     if choice.integer and not choice.log:
         return int(random.integers(int(low), int(high) + 1))
-    found = (
+    value = (
         math.exp(random.uniform(math.log(low), math.log(high))) if choice.log else random.uniform(low, high)
     )
-    return _clamped(found, choice)
+    return _clamped(value, choice)
 
 
 def _near(value: Any, choice: Choice, options: PopulationOptions, random: np.random.Generator) -> Any:
@@ -193,8 +193,8 @@ class Population:
         """
         population = cls(path, load(TrainingConfig, path / _CONFIG))
         try:
-            found = json.loads((path / _STATE).read_text(encoding="utf-8"))
-            population.generations = [[Member(**member) for member in members] for members in found]
+            state = json.loads((path / _STATE).read_text(encoding="utf-8"))
+            population.generations = [[Member(**member) for member in members] for members in state]
         except (OSError, ValueError, TypeError) as error:
             raise DataError(f"{path / _STATE}: not the state of a population ({error})") from None
         return population
@@ -256,8 +256,8 @@ class Population:
         return self._folder(len(self.generations) - 1) / f"member-{member.parent}"
 
     def _config_of(self, index: int, member: Member) -> TrainingConfig:
-        kept = replace(self.config.checkpoints, keep=1)
-        return varied(self.config, member.values, seed=self.config.seed + index, checkpoints=kept)
+        last_only = replace(self.config.checkpoints, keep=1)
+        return varied(self.config, member.values, seed=self.config.seed + index, checkpoints=last_only)
 
     def _note(self, endings: Mapping[str, Ending]) -> None:
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]

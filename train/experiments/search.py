@@ -52,10 +52,10 @@ def varied(config: TrainingConfig, values: Mapping[str, Any], **fields: Any) -> 
     Raises:
         ConfigurationError: a path is unknown, or a value wrong there.
     """
-    found = to_dict(replace(config, search={}, **fields))
+    fields_of_trial = to_dict(replace(config, search={}, **fields))
     for path, value in values.items():
-        _set(found, path, value)
-    return from_dict(TrainingConfig, found, "search")
+        _set(fields_of_trial, path, value)
+    return from_dict(TrainingConfig, fields_of_trial, "search")
 
 
 def check_space(config: TrainingConfig) -> None:
@@ -170,11 +170,11 @@ class Search:
         folder = self.path.resolve() / _TRIALS / f"{trial.number:04d}"
         return TrainingJob(f"trial {trial.number}", folder, self._config_with(self._values(trial.params)))
 
-    def _values(self, drawn: Mapping[str, Any]) -> dict[str, Any]:
-        """Values of what was drawn: of choices, Optuna is only told the place."""
+    def _values(self, params: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of a trial's parameters: of choices, Optuna holds the index."""
         return {
-            name: self.config.search[name].choices[found] if self.config.search[name].choices else found
-            for name, found in drawn.items()
+            name: self.config.search[name].choices[drawn] if self.config.search[name].choices else drawn
+            for name, drawn in params.items()
         }
 
     def _config_with(self, values: Mapping[str, Any]) -> TrainingConfig:
@@ -242,9 +242,9 @@ class _Session:
         self._trials[job.name] = trial
         return job
 
-    def told(self, job: Job, status: Status) -> bool:
+    def update(self, job: Job, status: Status) -> bool:
         """Pass on where a trial is; returns whether it is hopeless."""
-        self._listener.told(job, status)
+        self._listener.update(job, status)
         trial, options = self._trials[job.name], job.config.validation
         if status.score is not None and status.news and status.steps >= options.every:
             trial.report(rating(status.score, options.best), status.steps // options.every)

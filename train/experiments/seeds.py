@@ -19,7 +19,7 @@ from ...envs.storage import write_text
 from ...envs.task.options import PositiveCount
 from ..config import TrainingConfig
 from ..progress import TrainingProgress
-from ..run import RunFolder, free_folder
+from ..run import RunFolder, free_folder, is_training
 from ..training import Outcome
 from .engine import Ending, Engine, Listener, make_engine, run_jobs
 from .job import TrainingJob
@@ -175,12 +175,9 @@ class Place:
 
 
 def kind_of(path: Path) -> str | None:
-    """Which kind of several trainings a folder holds; None where it is one training."""
-    kinds = {"search": is_search, "seeds": is_seeds, "population": is_population}
-    found = next((kind for kind, holds in kinds.items() if holds(path)), None)
-    if found == "search":
-        raise DataError(f"--resume {path}: a search; say with --search how many trainings there shall be")
-    return found
+    """What was begun in a folder: "search", "seeds", "population" or "training"; None where nothing was."""
+    kinds = {"search": is_search, "seeds": is_seeds, "population": is_population, "training": is_training}
+    return next((kind for kind, holds in kinds.items() if holds(path)), None)
 
 
 def run_training(folder: RunFolder, place: Place) -> int:
@@ -227,10 +224,10 @@ def run_search(search: Search, trials: int, place: Place) -> int:
 def run_seeds(seeds: Seeds, place: Place) -> int:
     """Several seeds; returns the exit status."""
     with place.open() as (engine, progress):
-        found, interrupted = seeds.run(engine, progress)
+        results, interrupted = seeds.run(engine, progress)
     if interrupted:
         return _stopped(f"train --out {seeds.path}{place.words}")
-    print(f"{seeds.path}: {summary(found)}")
+    print(f"{seeds.path}: {summary(results)}")
     return _SUCCESS
 
 

@@ -46,7 +46,7 @@ class Heard:
         self.endings: dict[str, Ending] = {}
         self._press_after = press_after
 
-    def told(self, job: Job, status: Status) -> None:
+    def update(self, job: Job, status: Status) -> None:
         self.statuses.setdefault(job.name, []).append(status.steps)
         if self._press_after is not None and len(self.statuses) == self._press_after:
             self._press_after = None

@@ -124,8 +124,8 @@ def test_ctrl_c_stops_every_job_and_no_other_begins(engine, tmp_path):
 @elsewhere
 def test_a_listener_stops_one_job(engine, tmp_path):
     class Choosy(jobs.Heard):
-        def told(self, job, status):
-            super().told(job, status)
+        def update(self, job, status):
+            super().update(job, status)
             return job.name == "a"
 
     several = [Counting(tmp_path / "a", waits_at=2), Counting(tmp_path / "b")]

@@ -15,6 +15,7 @@ from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig
 from motion_cueing.train.experiments import seeds as studies
 from motion_cueing.train.experiments.seeds import Seeds, summary
+from motion_cueing.train.run import RunFolder
 from motion_cueing.train.training import Training
 
 from .. import tiny
@@ -82,6 +83,15 @@ def test_one_that_fails_is_named_when_the_others_are_done(config, tmp_path, monk
     with pytest.raises(DataError, match=r"failed: seed-5 \(not finite\); the same command tries again"):
         studies.run_seeds(seeds, HERE)
     assert [row["state"] for row in rows(seeds.path)] == ["failed", "done"]
+
+
+def test_what_was_begun_in_a_folder_is_known(config, tmp_path):
+    assert studies.kind_of(tmp_path) is None
+    seeds = Seeds.create(tmp_path / "seeds", config, 2)
+    assert studies.kind_of(seeds.path) == "seeds"
+    run = RunFolder.create(tmp_path / "run", config)
+    run.begin(0)
+    assert studies.kind_of(run.path) == "training"
 
 
 def test_the_summary_is_mean_lowest_and_highest():

@@ -198,8 +198,8 @@ class ValueBootstrap:
         finite &= torch.from_numpy(np.isfinite(costs).all(axis=0))
         if self._critic is None or self._options is None or not finite.any():
             return {}
-        observations, kept = observations[:, finite], torch.from_numpy(costs).float()[:, finite]
-        targets = self._critic.targets(observations, kept, self._discount, self._options.trace)
+        observations, finite_costs = observations[:, finite], torch.from_numpy(costs).float()[:, finite]
+        targets = self._critic.targets(observations, finite_costs, self._discount, self._options.trace)
         inputs = observations[:-1].flatten(0, 1)
         return {"train/value_error": self._critic.learn(inputs, targets.flatten(), self._options.batches)}
 

@@ -49,8 +49,8 @@ class Teacher:
 
     Raises:
         UnknownNameError: no policy has this name.
-        ConfigurationError: a library that it needs is missing, a field of the file is wrong, or the machines
-            are of several builds.
+        ConfigurationError: a library that it needs is missing, a field of the file is wrong, or the platform
+            is randomized.
     """
 
     def __init__(self, policy: str, batch: Batch) -> None:

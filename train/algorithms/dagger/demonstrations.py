@@ -95,7 +95,7 @@ class DriveEntry:
         cues: ``CueTrace.digest`` of what was driven, at the time step of the drive.
         steps: Time steps.
         cue_error: J of the drive.
-        perceived_cue_error: Its perceived twin.
+        perceived_cue_error: Perceived J of the drive.
         at_limit: Share of samples with any actuator at a limit.
         notes: What the controller counted.
     """

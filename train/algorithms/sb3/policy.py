@@ -81,7 +81,7 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         statistics: Any = normalize.obs_rms
         mean, variance, clip = statistics.mean.copy(), statistics.var.copy(), float(normalize.clip_obs)
     return Network(
-        **weights_of(linear_layers(layers)),
+        *weights_of(linear_layers(layers)),
         activation=_activation(layers),  # type: ignore[arg-type]
         squash="tanh" if squash else "clip",
         skip=skip,
@@ -126,8 +126,8 @@ def load_network(
 def _load_statistics(network: Network, normalize: VecNormalize | None, weight: float) -> None:
     normalized = normalize is not None and normalize.norm_obs
     if normalized != (network.mean is not None):
-        wanted = "true" if network.mean is not None else "false"
-        raise DataError(f"initial: the agent was trained with normalize.observation {wanted}; set it so")
+        needed = "true" if network.mean is not None else "false"
+        raise DataError(f"initial: the agent was trained with normalize.observation {needed}; set it so")
     if normalize is not None and network.mean is not None and network.variance is not None:
         statistics: Any = normalize.obs_rms
         statistics.mean, statistics.var = network.mean.copy(), network.variance.copy()
@@ -140,24 +140,25 @@ def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
     Raises:
         DataError: the policy is of another kind.
     """
-    policy: Any = model.policy
-    recurrent = isinstance(policy, RecurrentActorCriticPolicy)
-    if recurrent or not isinstance(policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy):
-        reason = (
-            "it has a memory, which no agent has; train PPO, SAC, TD3 or TQC"
-            if recurrent
-            else "it is none of PPO, SAC, TD3 and TQC; make a motion_cueing.train.agents.Network of it"
-        )
+    if isinstance(model.policy, RecurrentActorCriticPolicy):
+        reason = "it has a memory, which no agent has; train PPO, SAC, TD3 or TQC"
+    elif isinstance(model.policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy):
+        reason = ""
+    else:
+        reason = "it is none of PPO, SAC, TD3 and TQC; make a motion_cueing.train.agents.Network of it"
+    if reason:
         raise DataError(f"{type(model).__name__}: network_of cannot convert its policy: {reason}")
-    on_policy = isinstance(policy, ActorCriticPolicy)
+    on_policy, td3 = isinstance(model.policy, ActorCriticPolicy), isinstance(model.policy, TD3Policy)
+    skip = isinstance(model.policy, SkipPolicy)
+    policy: Any = model.policy
     actor = policy if on_policy else policy.actor
     if not isinstance(actor.features_extractor, FlattenExtractor):
         raise DataError("the policy's features extractor is not the plain one; it cannot become a network")
-    if isinstance(policy, SkipPolicy):
+    if skip:
         return [*policy.mlp_extractor.policy_net.hidden, policy.action_net], True, True
     if on_policy:
         return [*policy.mlp_extractor.policy_net, policy.action_net], bool(policy.squash_output), False
-    if isinstance(policy, TD3Policy):
+    if td3:
         return _flat(actor.mu)[:-1], True, False
     return [*_flat(actor.latent_pi), *_flat(actor.mu)], True, False
 
