@@ -148,5 +148,7 @@ class WashoutPolicy(Policy, Generic[P]):
 
 
 def make_washout(parameters: FamilyParameters, cab: Cab) -> WashoutPolicy[Any]:
-    """The policy of a parameter set of any family, for a cab."""
-    return WashoutPolicy(parameters, cab)
+    """The policy of a parameter set of any family, for a cab; of the family's own class where it has one."""
+    own: dict[str | None, Any] = {kind.algorithm: kind for kind in WashoutPolicy.__subclasses__()}
+    policy: WashoutPolicy[Any] = own.get(family_of(parameters).name, WashoutPolicy)(parameters, cab)
+    return policy
