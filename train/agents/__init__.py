@@ -1,17 +1,5 @@
 """Trained policies: one file each, which NumPy alone reads and runs.
 
-The shipped agents are made by name, any other from its file::
-
-    from motion_cueing.train.agents import Agent, agent_names, get_agent
-
-    agent = get_agent("learned")
-    agent = Agent.load("runs/ppo-1/best.safetensors")
-    action, _ = agent.predict(observation)
-
-A model of Stable-Baselines3 becomes one by ``motion_cueing.train.algorithms.sb3.policy.network_of``::
-
-    Agent("mine", task, network_of(model, normalize), Record(algo="ppo", seed=0)).save("mine.safetensors")
-
 The agents that come with the package have names in the registry of policies, from which any function makes
 them. Attributes are imported when they are first used: a list of names costs no import of Warp.
 """
