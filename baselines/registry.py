@@ -142,7 +142,7 @@ def _referenced(name: str, platform: Platform) -> Any:
         target = getattr(_import(module), attribute)
         if inspect.isclass(target) or inspect.isroutine(target):
             first = next(iter(inspect.signature(target).parameters), None)
-            target = target(platform) if first == "platform" else target()
+            target = target(platform) if first == "platform" else target()  # type: ignore[call-arg]
     except Exception as error:  # It is a user's code.
         raise ConfigurationError(f"policy {name}: {type(error).__name__}: {error}") from error
     return target

@@ -4,12 +4,16 @@ The agents that come with the package have names in the registry of policies, fr
 them. Attributes are imported when they are first used: a list of names costs no import of Warp.
 """
 
+from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .names import agent_names, describe_policy, is_agent, policy_names
+from ...baselines.registry import POLICY_FILES, describe_policy, policy_names, register
+from .names import FOLDER, SUFFIX, agent_names, description_in, is_agent
 
 if TYPE_CHECKING:
+    from ...envs.platform.machines import Platform
     from .agent import Agent, find_agent, get_agent
     from .files import Record
     from .network import Network
@@ -32,6 +36,7 @@ __all__ = [
     "get_agent",
     "is_agent",
     "policy_names",
+    "register_agents",
 ]
 
 
@@ -39,3 +44,19 @@ def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_LAZY[name], __name__), name)
+
+
+def _from_file(path: Path, platform: "Platform") -> "Agent":
+    from .agent import Agent
+
+    return Agent.load(path)
+
+
+def register_agents(folder: Path) -> None:
+    """Give the agents in a folder the names of their files."""
+    for path in sorted(folder.glob(f"*{SUFFIX}")):
+        register(path.stem, partial(_from_file, path), description_in(path))
+
+
+register_agents(FOLDER)
+POLICY_FILES.register(SUFFIX.removeprefix("."), _from_file, "an agent")

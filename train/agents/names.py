@@ -1,19 +1,10 @@
-"""Names of the shipped agents in the registry of policies, read without importing Warp."""
+"""Names and descriptions of the shipped agents, read from their files without importing Warp."""
 
 from __future__ import annotations
 
 import json
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
-
-from ...baselines.registry import POLICY_FILES, describe_policy, policy_names, register
-
-if TYPE_CHECKING:
-    from ...envs.platform.machines import Platform
-    from .agent import Agent
-
-__all__ = ["agent_names", "describe_policy", "description_of", "is_agent", "policy_names", "register_agents"]
+from typing import Any, Final
 
 FOLDER: Final = Path(__file__).parent
 SUFFIX: Final = ".safetensors"
@@ -46,8 +37,8 @@ def description_of(algorithm: str, any_machine: bool, platform: str, mode: str) 
     return f"agent by {algorithm} for {machine}, action {mode}"
 
 
-def _description(path: Path) -> str:
-    """The same of an agent's file, from its header alone."""
+def description_in(path: Path) -> str:
+    """The description of an agent in a file, from its header alone."""
     with open(path, "rb") as file:
         header = json.loads(file.read(int.from_bytes(file.read(LENGTH), "little")))
     about: dict[str, Any] = json.loads(header["__metadata__"][METADATA])["contents"]
@@ -58,19 +49,3 @@ def _description(path: Path) -> str:
         about["platform"]["name"],
         task["action"]["mode"],
     )
-
-
-def _from_file(path: Path, platform: Platform) -> Agent:
-    from .agent import Agent
-
-    return Agent.load(path)
-
-
-def register_agents(folder: Path) -> None:
-    """Give the agents in a folder the names of their files."""
-    for path in sorted(folder.glob(f"*{SUFFIX}")):
-        register(path.stem, partial(_from_file, path), _description(path))
-
-
-register_agents(FOLDER)
-POLICY_FILES.register(SUFFIX.removeprefix("."), _from_file, "an agent")

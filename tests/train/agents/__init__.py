@@ -10,7 +10,7 @@ from motion_cueing.baselines.registry import POLICIES
 from motion_cueing.baselines.washout.classical.scheduled import KNOBS
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.envs.task.observation import layout_of
-from motion_cueing.train.agents import Agent, Network, Record, names
+from motion_cueing.train.agents import Agent, Network, Record, names, register_agents
 
 RECORD = Record(
     algo="ppo", seed=3, command="motion-cueing train --algo ppo", steps=1000, versions={"numpy": "2.0"}
@@ -46,4 +46,4 @@ def ship(folder, monkeypatch):
     # Private, as a registry has no other way to forget a name.
     monkeypatch.setattr(POLICIES, "_entries", own)
     monkeypatch.setattr(names, "FOLDER", folder)
-    names.register_agents(folder)
+    register_agents(folder)
