@@ -451,11 +451,16 @@ def put_sensed(
     if v.modeled == 0:
         force_gain = e.force_gain
         rate_gain = e.rate_gain
-    for k in range(fixed.shape[1]):
-        of_force = k >= SIMULATOR_FORCE and k < SIMULATOR_FORCE + 3
-        of_rate = k >= SIMULATOR_RATE and k < SIMULATOR_RATE + 3
-        if not of_force and not of_rate:
-            put_entry(out, i, k, fixed[i, k], bounds)
+    # Everything but the cab's cues, which are written once, below.
+    for k in range(wp.static(min(FIRST["simulator_force"], FIRST["simulator_rate"]))):
+        put_entry(out, i, k, fixed[i, k], bounds)
+    for k in range(
+        wp.static(min(FIRST["simulator_force"], FIRST["simulator_rate"]) + 3),
+        wp.static(max(FIRST["simulator_force"], FIRST["simulator_rate"])),
+    ):
+        put_entry(out, i, k, fixed[i, k], bounds)
+    for k in range(wp.static(max(FIRST["simulator_force"], FIRST["simulator_rate"]) + 3), fixed.shape[1]):
+        put_entry(out, i, k, fixed[i, k], bounds)
     for k in range(3):
         force_noise = real(0.0)
         rate_noise = real(0.0)
