@@ -83,7 +83,7 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     os.kill(process.pid, signal.SIGINT)
     rest = process.communicate(timeout=120)[1]
     assert process.returncode == 130
-    assert f"go on with: motion-cueing train --resume {out}" in rest
+    assert f"go on with: motion-cueing train --out {out}" in rest
     assert "Traceback" not in rest
     (*_, last) = checkpoints_in(out / "checkpoints")
     steps = int(last.stem.split("-")[1])

@@ -208,7 +208,7 @@ def test_every_shipped_agent_loads_and_is_called_as_its_file():
 
 def test_reading_needs_no_learning_library(path):
     code = (
-        "import sys\nfrom motion_cueing.train.agents.agent import Agent\n"
+        "import sys\nfrom motion_cueing.train.agents import Agent\n"
         f"Agent.load({str(path)!r})\n"
         "print([n for n in ('torch', 'stable_baselines3', 'onnx', 'onnxruntime') if n in sys.modules])"
     )

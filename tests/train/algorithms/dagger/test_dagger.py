@@ -115,7 +115,7 @@ def test_one_that_is_told_the_drive_is_told_what_is_left_of_it():
 def test_the_pupil_learns_what_the_teacher_does(config):
     learner = DaggerLearner(replace(config, steps=2 * config.steps))
     learner._drive()
-    seen, told = learner._seen[0], learner._told[0]
+    seen, told = learner._observations[0], learner._labels[0]
     with torch.no_grad():
         before = float((learner.actor(seen) - told).pow(2).mean())
     learner.learn(nothing)

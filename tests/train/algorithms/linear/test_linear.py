@@ -110,9 +110,9 @@ def test_an_axis_that_does_not_move_gets_nothing(config):
 def test_a_search_finds_better_gains_than_it_began_with(config):
     learner = LinearLearner(config)
     began = coordinates(learner.given.start, 2)
-    before = learner._tried([began] * 6)[0]
+    before = learner._evaluate([began] * 6)[0]
     learner.learn(nothing)
-    assert learner._tried([learner._best] * 6)[0] == pytest.approx(learner._least)
+    assert learner._evaluate([learner._best] * 6)[0] == pytest.approx(learner._least)
     assert learner._least < before - 0.02
     assert learner.steps == config.steps
 
