@@ -113,7 +113,8 @@ class MpcParameters:
 
     With ``nonlinear`` false each plan is one quadratic program (the real-time iteration). With true it is the
     converged solution of the nonlinear program. Over the standard maneuvers both reach the same J to three
-    digits, and the nonlinear one is slower: its 99th percentile of a step is beyond the 10 ms of a time step.
+    digits. The nonlinear one is slower: the 99th percentile of its step time is two to three times that of
+    the linear one, and exceeds the 10 ms of a time step in some drives.
 
     Args:
         algorithm: Kind of controller, as parameter files name it.

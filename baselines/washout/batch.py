@@ -1,4 +1,4 @@
-"""Many washouts through many drives at once, and the gradient of J in their parameters: what tuning needs."""
+"""Batches for tuning: many parameter sets through many drives at once, and the gradient of J."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Scores:
 
     Args:
         cue_error: J.
-        perceived_error: Its perceived twin.
+        perceived_error: Perceived J.
         at_limit: Share of the steps in which a limit is met.
     """
 
@@ -76,10 +76,10 @@ class WashoutBatch:
         self.simulator.reset(np.repeat([start_pose(p) for p in sets], len(drives), axis=0))
 
     def scores(self, cost: CueCost | None = None, threads: int = 1) -> Scores:
-        """Drive them all to their ends.
+        """Drive all sets through all drives.
 
         Args:
-            cost: What J measures.
+            cost: Indifference zones of J.
             threads: Launches side by side; a launch on the CPU uses one core and lets others run.
         """
         if threads < 1:
@@ -151,5 +151,5 @@ class WashoutBatch:
                 inputs=[*simulator.constants, states[k], delay, actions[k]],
                 outputs=[states[k + 1], delay],
             )
-            share = real(1.0 / len(actions))
-            wp.launch(add_cue_error, simulator.n, inputs=[z, states[k + 1], share], outputs=[costs])
+            weight = real(1.0 / len(actions))
+            wp.launch(add_cue_error, simulator.n, inputs=[z, states[k + 1], weight], outputs=[costs])

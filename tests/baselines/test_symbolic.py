@@ -91,5 +91,6 @@ def test_a_motion_of_the_kernel_is_one_of_the_twin():
 
 def test_limits_are_those_of_the_machine():
     for platform in PRESETS.values():
+        limits = SymbolicMachine(platform).limits
         for name, values in actuator_limits(platform).items():
-            assert np.array_equal(SymbolicMachine(platform).limits[name], values)
+            assert np.array_equal(limits[name], values)

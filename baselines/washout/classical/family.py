@@ -140,7 +140,7 @@ def _high_pass(block: HighPass) -> Any:
 
 
 def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
-    """The kernels' form of a parameter set for a cab."""
+    """The kernels' struct of a parameter set for a cab."""
     k: Any = Parameters()
     for name in ("force_scale", "force_limit", "rate_scale", "rate_limit"):
         setattr(k, name, vec3(*getattr(p, name)))
@@ -170,15 +170,15 @@ def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
 _SCALES: Final = (0.2, 1.2)
 """From a fifth of the car's cue to a fifth more than it."""
 _FORCE_LIMITS: Final = (0.5, 10.0)
-"""From the perception of a force to the limit of a tyre, m/s^2."""
+"""From the threshold of perception to the limit of a tire, m/s^2."""
 _RATE_LIMITS: Final = (math.radians(3.0), 1.5)
-"""From the perception of a rate to what no road asks for, rad/s."""
+"""From the threshold of perception to beyond any road, rad/s."""
 _DAMPING: Final = (0.4, 2.0)
 """From a quarter of overshoot to two real poles a factor of 14 apart."""
 _ROTATION: Final = (0.001, 2.5)
 """rad/s; up to the set of shoarai/washout. The turntable has no end: yaw need not return within a drive."""
 _TRANSLATION: Final = (0.03, 2.5)
-"""rad/s; up to Reid and Nahon's sets. Below, the machine is not back for what comes half a minute later."""
+"""rad/s; up to Reid and Nahon's sets. Below, the machine takes more than half a minute to return."""
 _HEAVE: Final = (0.1, 10.0)
 _ROLL_OFF: Final = (10.0, 200.0)
 _TILT: Final = (0.1, 20.0)
@@ -188,8 +188,6 @@ _TILT_RATE: Final = (math.radians(0.5), math.radians(5.0))
 _TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(60.0))
 _APPROACH: Final = (0.5, 50.0)
 _SPLIT: Final = (0.3, 60.0)
-
-
 TRAVEL: Final = (0.3, 30.0)
 """m; up to where the carriage's ends no longer count."""
 CARRIAGE_SPEED: Final = (0.3, 30.0)
