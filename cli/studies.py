@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
 from ..evaluation.metrics import Criteria
 from ..evaluation.provenance import head_of
@@ -19,7 +20,6 @@ from ..evaluation.studies.results import (
 )
 from ..evaluation.studies.store import check_kept, forget_kept
 from ..evaluation.studies.study import Condition, StudyOutcome, run_study
-from ..evaluation.suite import suite_progress
 
 
 def prepare(out: Path, fresh: bool) -> None:
@@ -59,7 +59,7 @@ def run_and_save(
         Exit status: 1 if a drive failed.
     """
     count = sum(len(condition.maneuvers) for condition in conditions) * len(policies)
-    with suite_progress(count) as advance:
+    with drives_progress(count) as advance:
         outcome = run_study(conditions, policies, out, advance)
     results = results_of(conditions, list(policies), outcome, words)
     _write(results, out, title, ratios)

@@ -51,7 +51,12 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         file.write(data)
 
 
-# Where a command writes, checked before the work: a place that takes files, and nobody else's file.
+# What a user names: files, and where a command writes, checked before the work.
+
+
+def is_file(name: str) -> bool:
+    """Whether a word means a file rather than a registered name."""
+    return bool(Path(name).suffix) or len(Path(name).parts) > 1 or Path(name).exists()
 
 
 def check_folder(option: str, folder: Path) -> None:

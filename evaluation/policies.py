@@ -2,16 +2,63 @@
 
 from __future__ import annotations
 
+import sys
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
 from .. import baselines
 from ..baselines import ForeknowingPolicy, Policy
-from ..envs.errors import UnknownNameError
+from ..envs.errors import ConfigurationError, UnknownNameError
 from ..envs.platform import Platform
+from ..envs.storage import is_file
 from ..train.agents import Agent, agent_names, get_agent
 from ..train.agents.files import SUFFIX
 from .rollout import TaskPolicy, on_machine
-from .selection import is_file
+
+
+def is_reference(name: str) -> bool:
+    """Whether a name means an object of the user's: ``module:Class`` or ``file.py:Class``."""
+    return ":" in name
+
+
+def load_reference(name: str, platform: Platform) -> Any:
+    """An object of the user's that has ``predict``; a class or function is called to make it.
+
+    A class is called with the machine if its first argument is called ``platform``, else without arguments.
+
+    Raises:
+        ConfigurationError: it cannot be imported or made, or has no ``predict``.
+    """
+    module, _, attribute = name.rpartition(":")
+    try:
+        found = getattr(_import(module), attribute)
+        if not hasattr(found, "predict") or isinstance(found, type):
+            takes = next(iter(signature(found).parameters), None)
+            found = found(platform) if takes == "platform" else found()
+    except Exception as error:  # It is a user's code.
+        raise ConfigurationError(f"policy {name}: {type(error).__name__}: {error}") from error
+    if not hasattr(found, "predict"):
+        raise ConfigurationError(f"policy {name}: it has no method predict(observation, state, ...)")
+    return found
+
+
+def _import(module: str) -> Any:
+    """A module by name or file."""
+    if not module.endswith(".py"):
+        return import_module(module)
+    if not Path(module).exists():
+        raise FileNotFoundError(f"{module}: there is no such file")
+    spec = spec_from_file_location(Path(module).stem, module)
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = module_from_spec(spec)
+    # Dataclasses and pickles look for the module of their class.
+    sys.modules.setdefault(spec.name, loaded)
+    spec.loader.exec_module(loaded)
+    return loaded
 
 
 def policy_names() -> list[str]:
@@ -56,6 +103,8 @@ def make_policy(name: str, platform: Platform) -> Policy | TaskPolicy | Foreknow
         DataError: the file does not exist or cannot be read.
         ConfigurationError: a field of the file is wrong, or its agent was made for another machine.
     """
+    if is_reference(name):
+        return load_reference(name, platform)  # type: ignore[no-any-return]
     if is_agent(name):
         return on_machine(find_agent(name), platform)
     try:

@@ -131,7 +131,8 @@ def _readable(path: Path) -> bool:
 
 def identity(name: str, policy: Any) -> dict[str, Any]:
     """What a policy is, as plain values: its name or the content of its file, and its parameters."""
-    path = Path(name)
+    # Of a class in a file, `file.py:Class`, the file.
+    path = Path(name.rpartition(".py:")[0] + ".py" if ".py:" in name else name)
     parameters = getattr(policy, "parameters", None)
     return {
         "name": name,
