@@ -124,9 +124,10 @@ def _of_configuration(error: pydantic.ValidationError, arguments: Iterable[Argum
     flag = "--" + str(wrong["loc"][0]).replace("_", "-")
     argument = next((one for one in arguments if flag in one.names), None)
     found = str(wrong["input"])
+    message = wrong["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
     if argument is not None and wrong["type"].endswith(("_parsing", "literal_error")):
         return _wrong(argument, found)
-    return f"{flag} {wrong['msg'].removeprefix('Value error, ')}, found {found}."
+    return f"{flag} {message}, found {found}."
 
 
 def _plain(hint: Any) -> Any:

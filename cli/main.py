@@ -331,13 +331,18 @@ def _class_of(name: str) -> type[Any]:
     return getattr(import_module(command.module, __package__), command.arguments)  # type: ignore[no-any-return]
 
 
-def app_of(name: str) -> App:
-    """The parser of a command."""
+def app_of(name: str, prefix: str = f"{PROGRAM} ") -> App:
+    """The parser of a command.
+
+    Args:
+        name: Of the command.
+        prefix: Of its name in the help.
+    """
     from cyclopts import App, Parameter
 
     kind = _class_of(name)
     app = App(
-        name=f"{PROGRAM} {name}",
+        name=f"{prefix}{name}",
         help=cleandoc(kind.__doc__ or ""),
         help_format="markdown",
         version_flags=(),
@@ -357,7 +362,7 @@ def app_of(name: str) -> App:
 
 def _shown(value: Any) -> str | None:
     """A default in the help; None where it says nothing."""
-    if value is None or value is False or value == ():
+    if value in (None, False, (), ""):
         return None
     return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
@@ -373,7 +378,5 @@ def _completion(arguments: Sequence[str]) -> str:
     shell = look_up("shell", arguments[0] if arguments else "", {shell: shell for shell in SHELLS})
     whole = App(name=PROGRAM, version_flags=("--version",))
     for name in COMMANDS:
-        app = app_of(name)
-        app.name = (name,)
-        whole.command(app, name=name)
+        whole.command(app_of(name, prefix=""))
     return whole.generate_completion(prog_name=PROGRAM, shell=shell)  # type: ignore[arg-type]

@@ -93,10 +93,6 @@ def new_config(command: TrainingOptions, **others: Any) -> "TrainingConfig":
     """
     from ..train.config import load_config
 
-    if command.algorithm is None and command.config is None:
-        from ..train.registry import algorithm_names
-
-        raise ConfigurationError(f"--algorithm must be given; use one of {', '.join(algorithm_names())}")
     return load_config(
         command.algorithm,
         command.config,

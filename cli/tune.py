@@ -52,7 +52,7 @@ class TuneCommand:
     the same command goes on from the search kept beside --out, and another --hours makes it longer.
     """
 
-    algorithm: Annotated[str, Parameter(metavar="classical|adaptive|optimal-washout")]
+    algorithm: Annotated[str, Parameter(metavar="classical|adaptive|optimal")]
     """What to tune."""
     objective: Literal["J", "perceived"] = "J"
     """What to minimize: J, or J of the perceived cues."""
@@ -98,7 +98,7 @@ def run(command: TuneCommand) -> int:
     search = _search(record, command, goes_on)
     interrupt = Interrupt()
     with interrupt.caught(), Bars() as bars:
-        tell = _Telling(bars, search.options.budget)
+        tell = Telling(bars, search.options.budget)
         stopped = search.run(tell, lambda: interrupt.asked)
     _write(command, search, goes_on)
     status = search.status
@@ -111,7 +111,7 @@ def run(command: TuneCommand) -> int:
     return _SUCCESS
 
 
-class _Telling:
+class Telling:
     """Shows a search: a bar of the hours simulated, and lines where there is no terminal.
 
     Args:
@@ -144,6 +144,8 @@ def _check(command: TuneCommand) -> None:
         raise ConfigurationError(f"--out {command.out}: a policy's file ends in .yaml")
     if command.workers < 1:
         raise ConfigurationError(f"--workers must be at least 1, found {command.workers}")
+    if command.hours is not None and not command.hours > 0.0:
+        raise ConfigurationError(f"--hours must be positive, found {command.hours:g}")
     if command.drives is not None and "train" not in command.maneuvers:
         raise ConfigurationError("--drives counts random drives; leave it out, or add `train` to --maneuvers")
     _check_out(_out(command))

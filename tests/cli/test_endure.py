@@ -16,10 +16,10 @@ from motion_cueing.evaluation.endurance.results import EnduranceResults, Endured
 from motion_cueing.evaluation.endurance.run import Asked, Run, Stopped
 from motion_cueing.evaluation.policies import make_policy
 
-from ..studies import PAPER
+from ..evaluation.studies import PAPER
 
 SECONDS = 5.0
-ARGV = ["endure", "--policy", "no-motion", "classical", "--duration", str(SECONDS), "--envs", "2"]
+ARGV = ["endure", "--policies", "no-motion", "classical", "--duration", str(SECONDS), "--envs", "2"]
 
 
 def drive_hours(drives):
@@ -69,7 +69,17 @@ def test_it_writes_everything_and_goes_on(tmp_path, capsys):
 
 def test_a_single_drive_can_be_looked_into(tmp_path, capsys):
     seed = drive_seeds(2, 7)[1]
-    argv = ["endure", "--policy", "classical", "--duration", "6", "--only", str(seed), "--out", str(tmp_path)]
+    argv = [
+        "endure",
+        "--policies",
+        "classical",
+        "--duration",
+        "6",
+        "--seeds",
+        str(seed),
+        "--out",
+        str(tmp_path),
+    ]
     assert main(argv) == 0
     (drive,) = EnduranceResults.load_json(tmp_path / "endurance.json").policies["classical"].drives
     cues = CueTrace.from_csv(tmp_path / f"{drive.name}.csv")
@@ -131,13 +141,13 @@ def test_drives_in_one():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--policy", "classikal"], "classical"),
+        (["--policies", "classikal"], "classical"),
         (["--hours", "0"], "hours must be positive"),
         (["--hours", "inf"], "hours must be positive and finite"),
         (["--envs", "-1"], "envs must be positive"),
         (["--lag", "60", "30"], "from low to high"),
         (["--dead-time", "0.1"], "--dead-time"),
-        (["--only", "-5"], "seed is -5"),
+        (["--seeds", "-5"], "seed is -5"),
     ],
 )
 def test_wrong_arguments_are_told_in_one_line(words, told, tmp_path, capsys):
@@ -148,14 +158,14 @@ def test_wrong_arguments_are_told_in_one_line(words, told, tmp_path, capsys):
 
 
 def test_damaged_drives_and_foreign_results_are_refused(tmp_path, capsys):
-    argv = ["endure", "--policy", "no-motion", "--duration", "2", *drive_hours(1), "--out", str(tmp_path)]
+    argv = ["endure", "--policies", "no-motion", "--duration", "2", *drive_hours(1), "--out", str(tmp_path)]
     assert main(argv) == 0
     (kept,) = (tmp_path / "drives").iterdir()
     kept.write_text("{")
     assert main(argv) == 2
     assert f"{kept}: damaged" in capsys.readouterr().err
     # A wrong policy forgets nothing, and only what these policies drove is driven again.
-    assert main([*argv, "--fresh", "--policy", "no-motion", "nobody.safetensors"]) == 2
+    assert main([*argv, "--fresh", "--policies", "no-motion", "nobody.safetensors"]) == 2
     assert kept.read_text() == "{"
     (tmp_path / "drives" / "mine.txt").write_text("not of this command")
     assert main([*argv, "--fresh"]) == 0

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.cli import train as train_command
+from motion_cueing.cli import training as training_options
 from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import load
@@ -25,7 +26,7 @@ from motion_cueing.train.config import TrainingConfig
 from motion_cueing.train.run import RunFolder, checkpoints_in
 from motion_cueing.train.training import Training
 
-from . import tiny
+from ..train import tiny
 
 PROGRAM = (sys.executable, "-m", "motion_cueing.evaluation")
 
@@ -33,7 +34,7 @@ PROGRAM = (sys.executable, "-m", "motion_cueing.evaluation")
 @pytest.mark.parametrize("algo", tiny.ALGORITHMS)
 def test_an_agent_comes_of_it(algo, tmp_path, capsys):
     out = tmp_path / "run"
-    words = ["train", "--algo", algo, "--config", str(tiny.config_file(tmp_path, algo))]
+    words = ["train", "--algorithm", algo, "--config", str(tiny.config_file(tmp_path, algo))]
     assert main([*words, "--seed", "3", "--envs", "5", "--out", str(out)]) == 0
     told = capsys.readouterr()
     assert "final.safetensors: the agent after" in told.out
@@ -61,8 +62,8 @@ def test_an_agent_comes_of_it(algo, tmp_path, capsys):
 def test_an_agent_is_evaluated(tmp_path, capsys):
     out = tmp_path / "run"
     config = tiny.config_file(tmp_path, "ppo")
-    assert main(["train", "--algo", "ppo", "--config", str(config), "--out", str(out)]) == 0
-    words = ["evaluate", "--policy", str(out / "best.safetensors"), "--maneuver", "lane-change"]
+    assert main(["train", "--algorithm", "ppo", "--config", str(config), "--out", str(out)]) == 0
+    words = ["evaluate", "--policies", str(out / "best.safetensors"), "--maneuvers", "lane-change"]
     assert main([*words, "--out", str(tmp_path / "results")]) == 0
     assert "lane-change" in capsys.readouterr().out
 
@@ -71,7 +72,7 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     out = tmp_path / "run"
     path = tiny.config_file(tmp_path, "ppo", steps=10_000_000)
     process = subprocess.Popen(
-        [*PROGRAM, "train", "--algo", "ppo", "--config", str(path), "--out", str(out)],
+        [*PROGRAM, "train", "--algorithm", "ppo", "--config", str(path), "--out", str(out)],
         stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, cwd=tmp_path,
     )  # fmt: skip
     assert process.stderr is not None
@@ -84,12 +85,12 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     os.kill(process.pid, signal.SIGINT)
     rest = process.communicate(timeout=120)[1]
     assert process.returncode == 130
-    assert f"go on with: motion-cueing train --resume {out}" in rest
+    assert f"go on with: motion-cueing train --out {out}" in rest
     assert "Traceback" not in rest
     (*_, last) = checkpoints_in(out / "checkpoints")
     steps = int(last.stem.split("-")[1])
     assert f"stopped after {steps:,} steps" in rest
-    assert main(["train", "--resume", str(out), "--steps", str(steps + 64)]) == 0
+    assert main(["train", "--out", str(out), "--steps", str(steps + 64)]) == 0
     assert Agent.load(out / "final.safetensors").record.steps >= steps + 64
 
 
@@ -110,45 +111,66 @@ def test_other_versions_at_resuming_are_told(tmp_path, capsys):
     record = json.loads((folder.path / "run.json").read_text())
     record["sessions"][0]["versions"]["torch"] = "1.0"
     (folder.path / "run.json").write_text(json.dumps(record))
-    assert main(["train", "--resume", str(folder.path)]) == 0
+    assert main(["train", "--out", str(folder.path)]) == 0
     assert "note: torch was 1.0, is " in capsys.readouterr().err
 
 
 def complaint(words: list[str], capsys) -> str:
     """The one line of a refusal."""
-    assert main(["train", *words]) == 2
+    assert main(words) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
-    assert lines[0].startswith("motion-cueing train: ")
+    assert lines[0].startswith(f"motion-cueing {words[0]}: ")
     return lines[0]
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "--algo is missing; use one of ppo, sac, td3, tqc"),
-        (["--algo", "poo"], "unknown algorithm 'poo'. Did you mean ppo"),
-        (["--algo", "ppo", "--steps", "0"], "field 'steps'"),
-        (["--algo", "ppo", "--steps", "many"], "--steps"),
-        (["--algo", "ppo", "--config", "none.yaml"], "none.yaml: cannot be read"),
-        (["--algo", "ppo", "--config", "broken.yaml"], "broken.yaml: not YAML (line 2"),
-        (["--algo", "ppo", "--config", "typo.yaml"], "unknown field 'n_step'. Did you mean n_steps"),
-        (["--algo", "ppo", "--config", "drive.yaml"], "task.episode.drives names braking"),
-        (["--algo", "td3", "--config", "together.yaml"], "hyperparameters: "),
-        (["--resume", "nowhere"], "--resume nowhere: no training was begun there"),
-        (["--resume", "nowhere", "--search", "3"], "--resume nowhere: no search was begun there"),
-        (["--resume", "nowhere", "--seed", "3"], "--seed cannot be changed with --resume"),
-        (["--algo", "ppo", "--jobs", "2"], "--jobs is of use only where there are several trainings"),
-        (["--algo", "ppo", "--seeds", "2", "--search", "2"], "--search and --seeds do not go together"),
-        (["--algo", "ppo", "--engine", "rey"], "unknown engine 'rey'. Did you mean ray?"),
-        (["--algo", "ppo", "--address", "a:1"], "--address is of use only with --engine ray"),
-        (["--algo", "ppo", "--population", "1"], "field 'population.members'"),
-        (["--algo", "ppo", "--config", "nothing.yaml", "--population", "4"], "search is empty"),
-        (["--algo", "ppo", "--config", "shape.yaml", "--population", "4"], "cannot change in the middle"),
-        (["--algo", "ppo", "--config", "reward.yaml", "--population", "4"], "cannot be compared by reward"),
-        (["--algo", "ppo", "--search", "0"], "--search must be at least 1"),
-        (["--algo", "ppo", "--config", "nothing.yaml", "--search", "1"], "search is empty"),
-        (["--algo", "ppo", "--config", "wrong.yaml", "--search", "1"], "field 'validation.drives'"),
+        (["train"], "--algorithm must be given; use one of ppo, sac, td3, tqc"),
+        (["train", "--algorithm", "poo"], "unknown algorithm 'poo'. Did you mean ppo"),
+        (["train", "--algorithm", "ppo", "--steps", "0"], "field 'steps'"),
+        (["train", "--algorithm", "ppo", "--steps", "many"], "--steps takes a whole number, found 'many'"),
+        (["train", "--algorithm", "ppo", "--steps", "1.5"], "--steps takes a whole number, found '1.5'"),
+        (["train", "--algorithm", "ppo", "--config", "none.yaml"], "none.yaml: cannot be read"),
+        (["train", "--algorithm", "ppo", "--config", "broken.yaml"], "broken.yaml: not YAML (line 2"),
+        (
+            ["train", "--algorithm", "ppo", "--config", "typo.yaml"],
+            "unknown field 'n_step'. Did you mean n_steps",
+        ),
+        (["train", "--algorithm", "ppo", "--config", "drive.yaml"], "task.episode.drives names braking"),
+        (["train", "--algorithm", "td3", "--config", "together.yaml"], "hyperparameters: "),
+        (["train", "--algorithm", "ppo", "--out", "."], "there is something already that no training wrote"),
+        (["train", "--algo", "ppo"], "--algo is called --algorithm now."),
+        (
+            ["train", "--resume", "nowhere"],
+            "--resume is not needed now: a command goes on",
+        ),
+        (["train", "--search", "3"], "a command of its own now: motion-cueing search"),
+        (["train", "--population", "3"], "a command of its own now: motion-cueing population"),
+        (["train", "--jobs", "3"], "--jobs is called --workers now"),
+        (
+            ["train", "--algorithm", "ppo", "--workers", "2"],
+            "--workers is of use only where",
+        ),
+        (
+            ["train", "--algorithm", "ppo", "--seeds", "4"],
+            "such as 0 1 2 3, found 4",
+        ),
+        (["train", "--algorithm", "ppo", "--seeds", "0", "2"], "such as 0 1 2 3, found 0 2"),
+        (["train", "--algorithm", "ppo", "--engine", "rey"], "local, ray, found 'rey'. Did you mean ray?"),
+        (["train", "--algorithm", "ppo", "--address", "a:1"], "--address is of use only with --engine ray"),
+        (["population", "--algorithm", "ppo", "--members", "1"], "field 'population.members'"),
+        (["population", "--algorithm", "ppo", "--config", "nothing.yaml"], "search is empty"),
+        (["population", "--algorithm", "ppo", "--config", "shape.yaml"], "cannot change in the middle"),
+        (["population", "--algorithm", "ppo", "--config", "reward.yaml"], "cannot be compared by reward"),
+        (["search", "--algorithm", "ppo", "--trials", "0"], "--trials must be at least 1"),
+        (["search", "--algorithm", "ppo"], "--trials must be given: N"),
+        (["search", "--algorithm", "ppo", "--config", "nothing.yaml", "--trials", "1"], "search is empty"),
+        (
+            ["search", "--algorithm", "ppo", "--config", "wrong.yaml", "--trials", "1"],
+            "field 'validation.drives'",
+        ),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
@@ -172,19 +194,19 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
 
 
 def test_a_missing_package_is_told(monkeypatch):
-    monkeypatch.setattr(train_command, "find_spec", lambda name: None if name == "torch" else object())
+    monkeypatch.setattr(training_options, "find_spec", lambda name: None if name == "torch" else object())
     with pytest.raises(ConfigurationError, match=r"needs torch: pip install 'motion-cueing-gym\[train\]'"):
-        train_command.run(train_command.TrainCommand(algo="ppo"))
+        train_command.run(train_command.TrainCommand(algorithm="ppo"))
 
 
 def test_help_needs_no_learning_library():
     code = (
-        "import sys; from motion_cueing.evaluation.command_line import main; main(['train', '--help']); "
+        "import sys; from motion_cueing.cli.main import main; main(['train', '--help']); "
         "print(sorted({'torch', 'stable_baselines3', 'optuna'} & sys.modules.keys()))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip().endswith("[]")
-    assert "--resume" in done.stdout
+    assert "--fresh" in done.stdout
 
 
 def test_another_algorithm_can_be_registered(tmp_path, monkeypatch):
@@ -194,7 +216,7 @@ def test_another_algorithm_can_be_registered(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules[module].CLASSES, "mine", sys.modules[module].CLASSES["ppo"])
     registry.register(registry.Algorithm("mine", module, "the same again", preset=preset))
     assert "mine" in registry.algorithm_names()
-    assert main(["train", "--algo", "mine", "--out", str(tmp_path / "run")]) == 0
+    assert main(["train", "--algorithm", "mine", "--out", str(tmp_path / "run")]) == 0
     assert Agent.load(tmp_path / "run" / "final.safetensors").record.algo == "mine"
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motion_cueing.cli.arguments import find_platform, find_policies
 from motion_cueing.evaluation.benchmark import (
     ALL_RUNGS,
     LADDER,
@@ -35,7 +36,6 @@ from motion_cueing.evaluation.reporting.report import render
 from motion_cueing.evaluation.reporting.tables import maneuver_table, share_table, standings_table
 from motion_cueing.evaluation.reporting.text import number
 from motion_cueing.evaluation.results import Failure, Provenance, Results
-from motion_cueing.evaluation.selection import find_platform, find_policies
 
 from .synthetic import drive
 

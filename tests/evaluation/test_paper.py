@@ -57,7 +57,7 @@ def test_bounds_are_inclusive_and_two_sided():
 
 
 def test_the_command_writes_table_figures_and_page(tmp_path, capsys):
-    assert main(["evaluate", "--paper", "--out", str(tmp_path)]) == 0
+    assert main(["paper", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "FAIL" not in said
     record = json.loads((tmp_path / "paper.json").read_text())

@@ -174,7 +174,7 @@ def test_one_that_is_stopped_goes_on_to_the_same_bits(whole, config, tmp_path, m
         patched.setattr(Training, "_boundary", pressed)
         assert run(population)
     assert [member.rating for member in population.generations[1]] == [None] * 4
-    assert main(["train", "--resume", str(population.path)]) == 0
+    assert main(["population", "--out", str(population.path)]) == 0
     again = Population.open(population.path)
     assert again.generations == whole.generations
     for name in ("best", "final"):
@@ -193,7 +193,7 @@ def test_a_member_that_fails_ends_it_and_a_broken_state_is_told(config, tmp_path
 
     with monkeypatch.context() as patched:
         patched.setattr(Training, "train", fail_once)
-        with pytest.raises(DataError, match=r"failed: member-1 \(not finite\); --resume .* tries again"):
+        with pytest.raises(DataError, match=r"failed: member-1 \(not finite\); the same command tries again"):
             run(population)
     (population.path / "population.json").write_text("[[{}]]")
     with pytest.raises(DataError, match="not the state of a population"):

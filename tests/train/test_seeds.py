@@ -26,7 +26,7 @@ def rows(folder: Path) -> list[dict[str, str]]:
 
 def test_each_seed_has_a_folder_and_a_row_and_all_go_on(tmp_path, capsys):
     path, out = tiny.config_file(tmp_path, "apg"), tmp_path / "seeds"
-    words = ["train", "--algo", "apg", "--config", str(path), "--seed", "5", "--seeds", "2"]
+    words = ["train", "--algorithm", "apg", "--config", str(path), "--seeds", "5", "6"]
     assert main([*words, "--steps", "160", "--out", str(out)]) == 0
     told = capsys.readouterr()
     assert f"{out}: best in validation" in told.out
@@ -41,7 +41,7 @@ def test_each_seed_has_a_folder_and_a_row_and_all_go_on(tmp_path, capsys):
         assert load(TrainingConfig, folder / "config.yaml").seed == int(row["seed"])
         best = Agent.load(folder / "best.safetensors").record.validation
         assert best == pytest.approx(float(row["best"]), rel=1e-5)
-    assert main(["train", "--resume", str(out), "--steps", "320"]) == 0
+    assert main(["train", "--out", str(out), "--steps", "320"]) == 0
     assert [row["steps"] for row in rows(out)] == ["320", "320"]
     assert Agent.load(out / "seed-6" / "final.safetensors").record.steps == 320
 
@@ -53,13 +53,13 @@ def test_ctrl_c_stops_all_and_says_how_to_go_on(tmp_path, monkeypatch, capsys):
         signal.raise_signal(signal.SIGINT)
         boundary(training)
 
-    words = ["train", "--algo", "apg", "--config", str(path), "--seeds", "2", "--out", str(out)]
+    words = ["train", "--algorithm", "apg", "--config", str(path), "--seeds", "0", "1", "--out", str(out)]
     with monkeypatch.context() as patched:
         patched.setattr(Training, "_boundary", pressed)
-        assert main([*words, "--jobs", "1"]) == 130
-    assert f"stopped; go on with: motion-cueing train --resume {out} --jobs 1" in capsys.readouterr().err
+        assert main([*words, "--workers", "1"]) == 130
+    assert f"stopped; go on with: motion-cueing train --out {out} --workers 1" in capsys.readouterr().err
     assert [row["state"] for row in rows(out)] == ["stopped", "not begun"]
-    assert main(["train", "--resume", str(out)]) == 0
+    assert main(["train", "--out", str(out)]) == 0
     assert [row["state"] for row in rows(out)] == ["done", "done"]
 
 
@@ -74,8 +74,8 @@ def test_one_that_fails_is_named_when_the_others_are_done(tmp_path, monkeypatch,
 
     with monkeypatch.context() as patched:
         patched.setattr(Training, "train", fail_once)
-        assert main(["train", "--resume", str(seeds.path)]) == 2
-    assert f"failed: seed-0 (not finite); --resume {seeds.path} tries again" in capsys.readouterr().err
+        assert main(["train", "--out", str(seeds.path)]) == 2
+    assert "failed: seed-0 (not finite); the same command tries again" in capsys.readouterr().err
     assert [row["state"] for row in rows(seeds.path)] == ["failed", "done"]
 
 
@@ -87,14 +87,14 @@ def test_the_summary_is_mean_lowest_and_highest():
     ("place", "words"),
     [
         (studies.Place("local"), ""),
-        (studies.Place("ray", 4, "10.0.0.1:6379"), " --engine ray --address 10.0.0.1:6379 --jobs 4"),
+        (studies.Place("ray", 4, "10.0.0.1:6379"), " --engine ray --address 10.0.0.1:6379 --workers 4"),
     ],
 )
 def test_the_words_that_go_on_name_the_place(place, words):
     assert place.words == words
 
 
-def test_a_search_is_gone_on_with_only_by_its_option(tmp_path, capsys):
+def test_a_search_is_gone_on_with_only_by_its_command(tmp_path, capsys):
     (tmp_path / "search.journal").touch()
-    assert main(["train", "--resume", str(tmp_path)]) == 2
-    assert "say with --search how many trainings" in capsys.readouterr().err
+    assert main(["train", "--out", str(tmp_path)]) == 2
+    assert "holds a search; `motion-cueing search` goes on with it" in capsys.readouterr().err

@@ -42,11 +42,11 @@ def rows(search: Search) -> list[dict[str, str]]:
 
 def test_a_search_finds_a_configuration_resumes_and_runs_in_processes(tmp_path, capsys):
     path, out = tiny.config_file(tmp_path, "ppo", search=SPACE), tmp_path / "search"
-    words = ["train", "--algo", "ppo", "--config", str(path), "--steps", "128", "--search", "2"]
-    assert main([*words, "--out", str(out)]) == 0
+    words = ["search", "--algorithm", "ppo", "--config", str(path), "--steps", "128"]
+    assert main([*words, "--trials", "2", "--out", str(out)]) == 0
     assert "best.yaml: trial" in capsys.readouterr().out
     assert len(rows(Search.open(out))) == 2
-    assert main(["train", "--resume", str(out), "--search", "4", "--jobs", "2"]) == 0
+    assert main(["search", "--out", str(out), "--trials", "4", "--workers", "2"]) == 0
 
     search = Search.open(out)
     found = rows(search)

@@ -266,7 +266,7 @@ class Population:
     def _note(self, endings: Mapping[str, Ending]) -> None:
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]
         if wrong:
-            raise DataError(f"failed: {'; '.join(wrong)}; --resume {self.path} tries again")
+            raise DataError(f"failed: {'; '.join(wrong)}; the same command tries again")
         latest = self.generations[-1]
         for i, member in enumerate(latest):
             status = endings[f"member-{i}"].result.status

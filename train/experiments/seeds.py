@@ -23,8 +23,8 @@ from ..run import RunFolder, free_folder
 from ..training import Outcome
 from .engines import Ending, Engine, Listener, make_engine, run_jobs
 from .jobs import TrainingJob
-from .population import Population, is_population
-from .search import Search, is_search
+from .population import Population
+from .search import Search
 
 _PLAN: Final = "seeds.yaml"
 _TABLE: Final = "results.csv"
@@ -99,7 +99,7 @@ class Seeds:
         self._report(endings)
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]
         if wrong:
-            raise DataError(f"failed: {'; '.join(wrong)}; --resume {self.path} tries again")
+            raise DataError(f"failed: {'; '.join(wrong)}; the same command tries again")
         done = [ending.result.status.best for ending in endings.values() if not ending.result.interrupted]
         return done, interrupted
 
@@ -173,17 +173,8 @@ class Place:
     def words(self) -> str:
         """Options that lead here again."""
         given = {"engine": self.engine if self.engine != "local" else None}
-        given |= {"address": self.address, "jobs": None if self.jobs is None else str(self.jobs)}
+        given |= {"address": self.address, "workers": None if self.jobs is None else str(self.jobs)}
         return "".join(f" --{name} {value}" for name, value in given.items() if value is not None)
-
-
-def kind_of(path: Path) -> str | None:
-    """Which kind of several trainings a folder holds; None where it is one training."""
-    kinds = {"search": is_search, "seeds": is_seeds, "population": is_population}
-    found = next((kind for kind, holds in kinds.items() if holds(path)), None)
-    if found == "search":
-        raise DataError(f"--resume {path}: a search; say with --search how many trainings there shall be")
-    return found
 
 
 def run_training(folder: RunFolder, place: Place) -> int:
@@ -197,7 +188,7 @@ def run_training(folder: RunFolder, place: Place) -> int:
     with place.open() as (engine, progress):
         endings, _ = run_jobs(engine, [job], progress)
     if job.name not in endings:
-        return _stopped(f"--resume {folder.path}{place.words}")
+        return _stopped(f"train --out {folder.path}{place.words}")
     ending = endings[job.name]
     if ending.error is not None:
         raise DataError(ending.error)
@@ -208,7 +199,7 @@ def report_training(folder: RunFolder, outcome: Outcome, words: str = "") -> int
     """Say what came of a training; returns the exit status."""
     steps = outcome.status.steps
     if outcome.interrupted:
-        return _stopped(f"--resume {folder.path}{words}", f" after {steps:,} steps")
+        return _stopped(f"train --out {folder.path}{words}", f" after {steps:,} steps")
     print(f"{folder.final_agent}: the agent after {steps:,} steps")
     if folder.best_agent.exists():
         print(f"{folder.best_agent}: the best on the validation drives")
@@ -220,7 +211,7 @@ def run_search(search: Search, trials: int, place: Place) -> int:
     with place.open() as (engine, progress):
         interrupted = search.run(trials, engine, progress)
     if interrupted:
-        return _stopped(f"--resume {search.path} --search {trials}{place.words}")
+        return _stopped(f"search --out {search.path} --trials {trials}{place.words}")
     best = search.best()
     if best is not None:
         print(f"{search.best_config}: trial {best.number}, {best.value:.4g}")
@@ -232,7 +223,7 @@ def run_seeds(seeds: Seeds, place: Place) -> int:
     with place.open() as (engine, progress):
         found, interrupted = seeds.run(engine, progress)
     if interrupted:
-        return _stopped(f"--resume {seeds.path}{place.words}")
+        return _stopped(f"train --out {seeds.path}{place.words}")
     print(f"{seeds.path}: {summary(found)}")
     return _SUCCESS
 
@@ -242,11 +233,11 @@ def run_population(population: Population, place: Place) -> int:
     with place.open() as (engine, progress):
         interrupted = population.run(engine, progress)
     if interrupted:
-        return _stopped(f"--resume {population.path}{place.words}")
+        return _stopped(f"population --out {population.path}{place.words}")
     print(f"{population.best_agent}: the best of {len(population.generations[-1])} members")
     return _SUCCESS
 
 
 def _stopped(words: str, when: str = "") -> int:
-    print(f"stopped{when}; go on with: motion-cueing train {words}", file=sys.stderr)
+    print(f"stopped{when}; go on with: motion-cueing {words}", file=sys.stderr)
     return _INTERRUPTED
