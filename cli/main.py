@@ -362,7 +362,7 @@ def app_of(name: str, prefix: str = f"{PROGRAM} ") -> App:
 
 def _shown(value: Any) -> str | None:
     """A default in the help; None where it says nothing."""
-    if value in (None, False, (), ""):
+    if value is None or value is False or value in ((), ""):
         return None
     return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 

@@ -89,6 +89,18 @@ def test_a_recording_goes_on_where_it_was_stopped(folder, capsys):
     assert again.provenance == first.provenance
 
 
+def test_fresh_begins_anew_even_with_another_controller(folder, capsys):
+    words = ("--drives", "1", "--duration", "1", "--seed", "3")
+    assert record(*WASHOUT, *words) == 0
+    (folder / "notes.txt").write_text("mine")
+    assert record("--policy", "no-motion", *words) == 2
+    assert "name another --out, or add --fresh to begin anew" in capsys.readouterr().err
+    assert record("--policy", "no-motion", *words, "--fresh") == 0
+    assert "1 drives (1 new)" in capsys.readouterr().out
+    assert load_index(folder).setting["policy"] == "no-motion"
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
 def test_a_drive_whose_cues_have_changed_is_recorded_anew(folder, tmp_path, capsys):
     for name in ("first", "second"):
         surge(1.0, 1.0).to_csv(tmp_path / f"{name}.csv")

@@ -94,6 +94,33 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     assert Agent.load(out / "final.safetensors").record.steps >= steps + 64
 
 
+def test_the_same_command_goes_on_and_fresh_begins_anew(tmp_path, capsys):
+    out, config = tmp_path / "run", tiny.config_file(tmp_path, "ppo", steps=64)
+    words = ["train", "--algorithm", "ppo", "--config", str(config), "--out", str(out)]
+    sessions = []
+    for more in ([], ["--steps", "128"], ["--fresh"]):
+        assert main([*words, *more]) == 0
+        sessions.append(
+            [session["steps"] for session in json.loads((out / "run.json").read_text())["sessions"]]
+        )
+    assert sessions == [[0], [0, 64], [0]]
+    for more, told in (
+        (
+            ["--seed", "9"],
+            f"--seed 9: {out} was begun with 0; leave it out, name another --out, or add --fresh",
+        ),
+        (["--envs", "9"], f"--envs 9: {out} was begun with "),
+        (
+            ["--seeds", "0", "1"],
+            f"{out} holds a training; `motion-cueing train` without --seeds",
+        ),
+    ):
+        assert told in complaint([*words, *more], capsys)
+    config.write_text(config.read_text() + "\nlog_every: 17\n")
+    assert f"--config {config}: {out} was begun with another log_every; " in complaint(words, capsys)
+    assert "holds a training" in complaint(["search", *words[1:], "--trials", "2"], capsys)
+
+
 def test_ctrl_c_twice_interrupts_at_once():
     asked = interrupt.Interrupt()
     earlier = signal.getsignal(signal.SIGINT)

@@ -109,6 +109,15 @@ def test_ctrl_c_keeps_the_search_and_resume_ends_where_it_would_have(words, tmp_
     assert len(further.found) > len(whole.found)
 
 
+def test_fresh_begins_a_search_anew(words, tmp_path):
+    words += ["--hours", "0.001"]
+    assert main(words) == 0
+    begun = load_record(tmp_path / "mine.search.json")
+    assert main([*words, "--seed", "4"]) == 2
+    assert main([*words, "--seed", "4", "--fresh"]) == 0
+    assert load_record(tmp_path / "mine.search.json").options == replace(begun.options, seed=4)
+
+
 class PressedLater(Interrupt):
     """Ctrl-C during the third step."""
 
