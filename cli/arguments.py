@@ -14,6 +14,7 @@ from ..envs.storage import is_file
 
 if TYPE_CHECKING:
     from ..envs.car import Car
+    from ..envs.cues import CueTrace
     from ..envs.platform import Platform
     from ..evaluation.suite import CueSource
 
@@ -35,18 +36,26 @@ def whole_number(kind: Any, tokens: Sequence[Token]) -> int:
         return round(value)
 
 
+def option(metavar: str, **others: Any) -> Parameter:
+    """Of an option.
+
+    Args:
+        metavar: What stands for its value in the help. Cyclopts for Python 3.10, version 4, shows its own.
+        **others: More about it, as Cyclopts has it.
+    """
+    return Parameter(metavar=metavar, **others) if hasattr(Parameter, "metavar") else Parameter(**others)
+
+
 def several(metavar: str, **others: Any) -> Parameter:
     """Of an option that takes one or more values."""
-    return Parameter(consume_multiple=(1, None), metavar=metavar, **others)
+    return option(metavar, consume_multiple=(1, None), **others)
 
 
 _POLICY: Final = "NAME|FILE|MODULE:CLASS"
-Whole = Annotated[int, Parameter(converter=whole_number, metavar="N")]
-Name = Annotated[str, Parameter(metavar="NAME|FILE")]
+Whole = Annotated[int, option("N", converter=whole_number)]
+Name = Annotated[str, option("NAME|FILE")]
 Names = Annotated[tuple[str, ...], several("NAME|FILE ...")]
-PolicyName = Annotated[
-    str, Parameter(metavar=_POLICY, help="Policy, by name, by file, or a class of your own.")
-]
+PolicyName = Annotated[str, option(_POLICY, help="Policy, by name, by file, or a class of your own.")]
 PolicyNames = Annotated[
     tuple[str, ...],
     several(
@@ -54,9 +63,7 @@ PolicyNames = Annotated[
         help="Policies, by name, by file, or classes of your own; `benchmark` for those of the benchmark.",
     ),
 ]
-ManeuverName = Annotated[
-    str, Parameter(metavar="NAME|FILE", help="Maneuver or recording, by name or cue CSV file.")
-]
+ManeuverName = Annotated[str, option("NAME|FILE", help="Maneuver or recording, by name or cue CSV file.")]
 ManeuverNames = Annotated[
     tuple[str, ...],
     several(
@@ -64,13 +71,11 @@ ManeuverNames = Annotated[
         help="Maneuvers and recordings, by name or cue CSV file; `all` for every one of them.",
     ),
 ]
-PlatformName = Annotated[str, Parameter(metavar="NAME|FILE", help="Motion base, by name or YAML file.")]
-CarName = Annotated[str, Parameter(metavar="NAME|FILE", help="Car, by name or YAML file.")]
-OutFolder = Annotated[
-    Path, Parameter(metavar="DIR", help="Folder for everything that is written; made if missing.")
-]
+PlatformName = Annotated[str, option("NAME|FILE", help="Motion base, by name or YAML file.")]
+CarName = Annotated[str, option("NAME|FILE", help="Car, by name or YAML file.")]
+OutFolder = Annotated[Path, option("DIR", help="Folder for everything that is written; made if missing.")]
 Workers = Annotated[
-    int, Parameter(converter=whole_number, metavar="N", help="Processes or threads that work at a time.")
+    int, option("N", converter=whole_number, help="Processes or threads that work at a time.")
 ]
 Fresh = Annotated[bool, Parameter(help="Begin anew instead of going on from what is in --out.")]
 
@@ -196,8 +201,12 @@ def find_maneuvers(names: Sequence[str], car: Car) -> dict[str, CueSource]:
             sources[label] = partial(get_recording, name)
         else:
             cues = CueTrace.from_csv(name, label)
-            sources[label] = lambda cues=cues: cues
+            sources[label] = partial(_same, cues)
     return sources
+
+
+def _same(cues: CueTrace) -> CueTrace:
+    return cues
 
 
 def find_maneuver(name: str, car: Car) -> tuple[str, CueSource]:

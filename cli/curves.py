@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
-from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.storage import check_file, replacing
+from .arguments import option, several
 
 Curve = NDArray[np.float64]
 """(2, k) steps and values."""
@@ -33,11 +33,9 @@ class CurvesCommand:
     line for their mean, and a band from the lowest to the highest.
     """
 
-    runs: Annotated[tuple[Path, ...], Parameter(metavar="DIR ...", consume_multiple=(1, None))] = field(
-        kw_only=False
-    )
+    runs: Annotated[tuple[Path, ...], several("DIR ...")] = field(kw_only=False)
     """Folders that `motion-cueing train` made."""
-    out: Annotated[Path, Parameter(metavar="FILE.png|FILE.svg")]
+    out: Annotated[Path, option("FILE.png|FILE.svg")]
     """Picture to write."""
     scalar: str = "validation/J"
     """Column of log.csv."""

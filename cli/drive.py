@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError
 from ..envs.storage import check_file
-from .arguments import CarName, ManeuverName, Name, Whole, find_car, find_maneuver, find_platform
+from .arguments import CarName, ManeuverName, Name, Whole, find_car, find_maneuver, find_platform, option
 from .serve import DEFAULT_PORT
 
 if TYPE_CHECKING:
@@ -28,7 +26,7 @@ class DriveCommand:
     """
 
     maneuver: ManeuverName = "double-lane-change"
-    to: Annotated[str, Parameter(metavar="HOST[:PORT]")] = f"127.0.0.1:{DEFAULT_PORT}"
+    to: Annotated[str, option("HOST[:PORT]")] = f"127.0.0.1:{DEFAULT_PORT}"
     """Where the controller listens."""
     rate: Whole = 1000
     """Packets a second; also the rate of the set-points that are expected."""
@@ -53,7 +51,7 @@ class DriveCommand:
     """Time to go on listening after the last packet, s."""
     cpu: Whole | None = None
     """Core to run on alone."""
-    report: Annotated[Path | None, Parameter(metavar="FILE.json")] = None
+    report: Annotated[Path | None, option("FILE.json")] = None
     """Counts and timings to write."""
 
 

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError
 from ..envs.progress import progress
 from ..envs.storage import check_folder, check_own_json
@@ -22,6 +20,7 @@ from .arguments import (
     Whole,
     find_platform,
     find_policies,
+    option,
     several,
 )
 
@@ -56,11 +55,11 @@ class EndureCommand:
     duration: float = 120.0
     """Of a drive, s."""
     platform: PlatformName = "paper"
-    friction: Annotated[tuple[float, float], Parameter(metavar="LOW HIGH")] = (0.7, 1.0)
+    friction: Annotated[tuple[float, float], option("LOW HIGH")] = (0.7, 1.0)
     """Range of a factor on the tires' friction."""
-    lag: Annotated[tuple[float, float], Parameter(metavar="LOW HIGH")] = (30.0, 90.0)
+    lag: Annotated[tuple[float, float], option("LOW HIGH")] = (30.0, 90.0)
     """Range of the natural frequency of the actuators' lag, rad/s."""
-    dead_time: Annotated[tuple[float, float], Parameter(metavar="LOW HIGH")] = (0.0, 0.05)
+    dead_time: Annotated[tuple[float, float], option("LOW HIGH")] = (0.0, 0.05)
     """Range of the actuators' dead time, s."""
     envs: Whole = 256
     """Drives side by side."""

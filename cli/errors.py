@@ -107,7 +107,7 @@ def _missing(command: str, error: MissingArgumentError, argument: Argument) -> s
     strange = next((w for w in words if w.startswith("--") and w.split("=", 1)[0] not in flags), None)
     if strange is not None:
         return _unknown(command, strange, flags)
-    metavar = (argument.parameter.metavar or "").removesuffix(" ...")
+    metavar = (getattr(argument.parameter, "metavar", None) or "").removesuffix(" ...")
     return f"{argument.name} must be given{': ' if metavar else ''}{metavar}."
 
 

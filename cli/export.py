@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError
 from ..envs.storage import check_file
+from .arguments import option
 
 if TYPE_CHECKING:
     from ..train.agents import Agent
@@ -22,9 +21,9 @@ class ExportCommand:
     `motion-cueing list` shows the names of the agents that come with the package.
     """
 
-    policy: Annotated[str, Parameter(metavar="NAME|FILE.safetensors")]
+    policy: Annotated[str, option("NAME|FILE.safetensors")]
     """Agent, by name or file."""
-    out: Annotated[Path, Parameter(metavar="FILE.onnx")]
+    out: Annotated[Path, option("FILE.onnx")]
     """File to write."""
 
 

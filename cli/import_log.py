@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from ..envs.errors import ConfigurationError
 from ..envs.logs.columns import ImportOptions, parse_columns
 from ..envs.storage import check_file, write_bytes
-from .arguments import Whole, several
+from .arguments import Whole, option, several
 
 _MOST_DECIMALS: Final = 15
 """More digits than a double has are noise."""
@@ -25,15 +25,15 @@ class ImportCommand:
     forward axis, v r against the lateral one, course against yaw rate), and prints what it found.
     """
 
-    file: Annotated[Path, Parameter(metavar="LOG")] = field(kw_only=False)
+    file: Annotated[Path, option("LOG")] = field(kw_only=False)
     """Log to convert: CSV with a header row, or .csv.gz."""
     columns: Annotated[tuple[str, ...], several("SIGNAL=COLUMN[:UNIT] ...")]
     """Columns of the signals time [s, ms, us], force_x force_y force_z [m/s2, g], rate_x rate_y rate_z
     [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
     before a column reverses it; a number instead of one is a constant. Speed and course may be missing."""
-    out: Annotated[Path, Parameter(metavar="FILE")]
+    out: Annotated[Path, option("FILE")]
     """Cues to write, as CSV; packed if the name ends in .gz."""
-    plot: Annotated[Path | None, Parameter(metavar="FILE.png")] = None
+    plot: Annotated[Path | None, option("FILE.png")] = None
     """Picture (PNG) to write: cues against the car's own motion, raw signals, spectra."""
     decimals: Whole | None = None
     """Digits after the point in the cues; nine significant digits if not given."""

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError
 from ..envs.progress import progress
 from ..envs.storage import check_file
 from . import arguments
-from .arguments import CarName, ManeuverName, PlatformName, PolicyName
+from .arguments import CarName, ManeuverName, PlatformName, PolicyName, option
 
 if TYPE_CHECKING:
     from ..envs.rendering import Renderer
@@ -30,7 +28,7 @@ _GIF_RATE: Final = 12.5
 class RenderCommand:
     """Draw a drive: the moving machine beside the reference cues and the simulator's cues."""
 
-    out: Annotated[Path, Parameter(metavar="FILE.gif|.mp4|.png")]
+    out: Annotated[Path, option("FILE.gif|.mp4|.png")]
     """File to write; a png shows one moment."""
     maneuver: ManeuverName = "double-lane-change"
     policy: PolicyName = "classical"
@@ -40,7 +38,7 @@ class RenderCommand:
     """Time of the first frame, s; of a png the moment shown, default: the middle of the drive."""
     end: float | None = None
     """Time of the last frame, s; default: the end of the drive."""
-    size: Annotated[tuple[int, int] | None, Parameter(metavar="WIDTH HEIGHT")] = None
+    size: Annotated[tuple[int, int] | None, option("WIDTH HEIGHT")] = None
     """Width and height, pixels; default 1280 720, of a gif 800 450."""
     rate: float | None = None
     """Frames a second; default 30, of a gif 12.5, whose frames last whole hundredths of a second."""

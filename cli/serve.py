@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError
 from ..envs.progress import compilation_announced
 from ..envs.storage import check_file
 from . import arguments
-from .arguments import PlatformName, PolicyName, Whole
+from .arguments import PlatformName, PolicyName, Whole, option
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
@@ -47,7 +45,7 @@ class ServeCommand:
     """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
     port: Whole = DEFAULT_PORT
     """Port to listen at; 0 for any that is free."""
-    peer: Annotated[str, Parameter(metavar="HOST[:PORT]")] = ""
+    peer: Annotated[str, option("HOST[:PORT]")] = ""
     """Listen to this sender alone; default: to the first, until it falls silent."""
     format: Literal["floats", "msgpack"] = "floats"
     """How packets are written."""
@@ -69,9 +67,9 @@ class ServeCommand:
     """Core to run on alone."""
     priority: Whole | None = None
     """Real-time priority (SCHED_FIFO), 1 to 99; needs the right to it."""
-    log: Annotated[Path | None, Parameter(metavar="FILE.npz")] = None
+    log: Annotated[Path | None, option("FILE.npz")] = None
     """Trajectory to write, for `motion-cueing evaluate --replays`."""
-    report: Annotated[Path | None, Parameter(metavar="FILE.json")] = None
+    report: Annotated[Path | None, option("FILE.json")] = None
     """Counts and timings to write."""
 
 
@@ -117,9 +115,9 @@ def _check(command: ServeCommand) -> None:
         raise ConfigurationError(f"--lead must not be negative, found {command.lead:g}")
     if command.log is not None and command.log.suffix != ".npz":
         raise ConfigurationError(f"--log {command.log}: a trajectory's file ends in .npz")
-    for option, file in (("--log", command.log), ("--report", command.report)):
+    for flag, file in (("--log", command.log), ("--report", command.report)):
         if file is not None:
-            check_file(option, file)
+            check_file(flag, file)
 
 
 def _made(command: ServeCommand) -> _Served:

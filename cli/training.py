@@ -8,10 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError, DataError
-from .arguments import Fresh, Whole, Workers
+from .arguments import Fresh, Whole, Workers, option
 
 if TYPE_CHECKING:
     from ..train.config import TrainingConfig
@@ -26,12 +24,12 @@ _HELD: Final = {"algorithm": "algo", "seed": "seed", "envs": "n_envs", "initial"
 class TrainingOptions:
     """Options of every command that trains."""
 
-    algorithm: Annotated[str | None, Parameter(metavar="NAME")] = None
+    algorithm: Annotated[str | None, option("NAME")] = None
     """Algorithm, of those that `motion-cueing list` names; the other options change its default
     configuration."""
-    config: Annotated[Path | None, Parameter(metavar="FILE.yaml|NAME")] = None
+    config: Annotated[Path | None, option("FILE.yaml|NAME")] = None
     """Configuration: only what differs from the algorithm's default; or the name of a shipped agent's."""
-    initial: Annotated[Path | None, Parameter(metavar="FILE.safetensors")] = None
+    initial: Annotated[Path | None, option("FILE.safetensors")] = None
     """Agent whose network the training begins with, with the same observation and action."""
     steps: Whole | None = None
     """Actions in all, over all environments, such as 1e6; default: as the configuration says, like the next
@@ -40,7 +38,7 @@ class TrainingOptions:
     """Of everything that is drawn."""
     envs: Whole | None = None
     """Environments stepped together."""
-    out: Annotated[Path | None, Parameter(metavar="DIR")] = None
+    out: Annotated[Path | None, option("DIR")] = None
     """Folder for everything that comes of it; the command goes on from what is in it. Default: a new folder,
     runs/ALGORITHM-1 and so on."""
     fresh: Fresh = False
@@ -48,7 +46,7 @@ class TrainingOptions:
     """Trainings at a time, each in a process of its own; default: 1, with Ray one a core."""
     engine: Literal["local", "ray"] = "local"
     """Where trainings run: this machine alone, or Ray."""
-    address: Annotated[str | None, Parameter(metavar="HOST:PORT")] = None
+    address: Annotated[str | None, option("HOST:PORT")] = None
     """Ray cluster to run on, which this machine is a part of; default: a Ray of its own on this machine."""
 
 
@@ -163,10 +161,10 @@ def check_same(command: TrainingOptions, begun: "TrainingConfig") -> None:
     from ..envs.settings import to_dict
     from ..train.config import load_config
 
-    for option, name in _HELD.items():
-        given, was = getattr(command, option), getattr(begun, name)
+    for flag, name in _HELD.items():
+        given, was = getattr(command, flag), getattr(begun, name)
         if given is not None and str(given) != str(was):
-            raise ConfigurationError(f"--{option} {given}: {command.out} was begun with {was}; {_ELSE}")
+            raise ConfigurationError(f"--{flag} {given}: {command.out} was begun with {was}; {_ELSE}")
     if command.config is None:
         return
     held = {name: getattr(begun, name) for name in ("steps", "seed", "n_envs", "initial", "population")}

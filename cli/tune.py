@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from cyclopts import Parameter
-
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.progress import Bars
 from ..envs.storage import check_file, write_text
@@ -22,6 +20,7 @@ from .arguments import (
     find_car,
     find_maneuvers,
     find_platform,
+    option,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ class TuneCommand:
     the same command goes on from the search kept beside --out, and another --hours makes it longer.
     """
 
-    algorithm: Annotated[str, Parameter(metavar="classical|adaptive|optimal")]
+    algorithm: Annotated[str, option("classical|adaptive|optimal")]
     """What to tune."""
     objective: Literal["J", "perceived"] = "J"
     """What to minimize: J, or J of the perceived cues."""
@@ -69,13 +68,13 @@ class TuneCommand:
     1000."""
     seed: Whole | None = None
     """Of everything that the search draws; default: 0."""
-    start: Annotated[str | None, Parameter(metavar="NAME|FILE")] = None
+    start: Annotated[str | None, option("NAME|FILE")] = None
     """Set to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it;
     default: the set that is set by hand."""
     platform: PlatformName = "paper"
     car: CarName = "sedan"
     workers: Workers = 1
-    out: Annotated[Path | None, Parameter(metavar="FILE.yaml")] = None
+    out: Annotated[Path | None, option("FILE.yaml")] = None
     """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json;
     default: my-classical.yaml and so on."""
     fresh: Fresh = False
@@ -200,7 +199,7 @@ def _options(command: TuneCommand) -> TuningOptions:
     from ..baselines.tuning.search import TuningOptions
     from ..baselines.washout.families import ALGORITHMS, load_of
 
-    given = {"drives": command.drives, "budget": command.hours, "seed": command.seed}
+    given: dict[str, Any] = {"drives": command.drives, "budget": command.hours, "seed": command.seed}
     return TuningOptions(
         start=load_of(command.algorithm, command.start or ALGORITHMS[command.algorithm].start),
         objective=command.objective,

@@ -143,7 +143,7 @@ def drives_progress(total: int) -> Iterator[Callable[[str, str], None]]:
 def compilation_announced() -> Iterator[None]:
     """Say so when Warp compiles kernels within the block: the first run is silent for long otherwise.
 
-    Warp makes a folder in its cache before it compiles; a thread looks for a new one.
+    Warp compiles into a folder of its cache whose name has the number of the process; a thread looks for it.
     """
     over = threading.Event()
     watch = threading.Thread(target=_watch_cache, args=(over,), name="kernels", daemon=True)
@@ -156,14 +156,10 @@ def compilation_announced() -> Iterator[None]:
 
 
 def _watch_cache(over: threading.Event) -> None:
-    known: set[str] | None = None
+    mark = f"_p{os.getpid()}_"
     while not over.wait(_LOOK):
         warp = sys.modules.get("warp")
         folder = getattr(getattr(warp, "config", None), "kernel_cache_dir", None)
-        if not folder:
-            continue
-        there = set(os.listdir(folder)) if os.path.isdir(folder) else set()
-        if known is not None and there - known:
+        if folder and os.path.isdir(folder) and any(mark in name for name in os.listdir(folder)):
             print(COMPILING, file=sys.stderr, flush=True)
             return
-        known = there

@@ -72,8 +72,8 @@ def room(module: str) -> str | None:
 def test_the_imports_of_known_modules_are_found():
     assert "envs.platform.kernels.geometry" in imports("baselines.washout.kernels.step")
     assert {"envs.cues", "evaluation.trajectory", "baselines.policy"} <= imports("evaluation.rollout")
-    assert "evaluation.policies" not in imports("cli.evaluate", everywhere=False)
-    assert "evaluation.policies" in imports("cli.evaluate")
+    assert "evaluation.policies" not in imports("cli.arguments", everywhere=False)
+    assert "evaluation.policies" in imports("cli.arguments")
     assert set(ALLOWED) == set(PACKAGES)
 
 

@@ -192,7 +192,7 @@ def complaint(words: list[str], capsys) -> str:
         (["population", "--algorithm", "ppo", "--config", "shape.yaml"], "cannot change in the middle"),
         (["population", "--algorithm", "ppo", "--config", "reward.yaml"], "cannot be compared by reward"),
         (["search", "--algorithm", "ppo", "--trials", "0"], "--trials must be at least 1"),
-        (["search", "--algorithm", "ppo"], "--trials must be given: N"),
+        (["search", "--algorithm", "ppo"], "--trials must be given"),
         (["search", "--algorithm", "ppo", "--config", "nothing.yaml", "--trials", "1"], "search is empty"),
         (
             ["search", "--algorithm", "ppo", "--config", "wrong.yaml", "--trials", "1"],

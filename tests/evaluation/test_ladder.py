@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motion_cueing.cli.arguments import find_platform, find_policies
+from motion_cueing.cli.arguments import BENCHMARK, find_platform, find_policies
 from motion_cueing.evaluation.benchmark import (
-    ALL_RUNGS,
     LADDER,
     ladder_names,
     ladder_table,
@@ -148,7 +147,7 @@ def test_the_ladder_goes_from_no_motion_to_the_optimum():
 
 def test_ladder_stands_for_its_policies_among_others():
     platform = find_platform("paper")
-    found = find_policies([ALL_RUNGS, "brk", "classical"], platform)
+    found = find_policies([BENCHMARK, "brk", "classical"], platform)
     assert list(found) == [*ladder_names(policy_names()), "brk"]
 
 

@@ -101,7 +101,7 @@ def test_the_command_exports_and_reports(tmp_path, capsys):
     [
         ("a.safetensors", "a.txt", "--out a.txt: name a file that ends in .onnx"),
         ("none.safetensors", "a.onnx", "there is no such file"),
-        ("a.yaml", "a.onnx", "not an agent"),
+        ("a.yaml", "a.onnx", "is no trained network"),
         ("nosuch", "a.onnx", "nosuch"),
     ],
 )
