@@ -40,10 +40,11 @@ def option(metavar: str, **others: Any) -> Parameter:
     """Of an option.
 
     Args:
-        metavar: What stands for its value in the help. Cyclopts for Python 3.10, version 4, shows its own.
-        **others: More about it, as Cyclopts has it.
+        metavar: What stands for its value in the help.
+        **others: More about it, as Cyclopts has it; what its version for Python 3.10, 4, lacks is left out.
     """
-    return Parameter(metavar=metavar, **others) if hasattr(Parameter, "metavar") else Parameter(**others)
+    wanted = {"metavar": metavar, **others}
+    return Parameter(**{name: value for name, value in wanted.items() if hasattr(Parameter, name)})
 
 
 def several(metavar: str, **others: Any) -> Parameter:
@@ -51,28 +52,49 @@ def several(metavar: str, **others: Any) -> Parameter:
     return option(metavar, consume_multiple=(1, None), **others)
 
 
+def named(*titles: str) -> Callable[[object], dict[str, str]]:
+    """Completes the names that `motion-cueing list` shows under these titles, each with its description."""
+
+    def names(context: object) -> dict[str, str]:
+        from .list import catalogue
+
+        return {name: line for title, rows in catalogue() if title in titles for name, line in rows}
+
+    return names
+
+
+_POLICIES: Final = named("Policies")
+_MANEUVERS: Final = named("Maneuvers", "Recorded drives")
 _POLICY: Final = "NAME|FILE|MODULE:CLASS"
 Whole = Annotated[int, option("N", converter=whole_number)]
 Name = Annotated[str, option("NAME|FILE")]
 Names = Annotated[tuple[str, ...], several("NAME|FILE ...")]
-PolicyName = Annotated[str, option(_POLICY, help="Policy, by name, by file, or a class of your own.")]
+PolicyName = Annotated[
+    str, option(_POLICY, completer=_POLICIES, help="Policy, by name, by file, or a class of your own.")
+]
 PolicyNames = Annotated[
     tuple[str, ...],
     several(
         f"{_POLICY} ...",
+        completer=_POLICIES,
         help="Policies, by name, by file, or classes of your own; `benchmark` for those of the benchmark.",
     ),
 ]
-ManeuverName = Annotated[str, option("NAME|FILE", help="Maneuver or recording, by name or cue CSV file.")]
+ManeuverName = Annotated[
+    str, option("NAME|FILE", completer=_MANEUVERS, help="Maneuver or recording, by name or cue CSV file.")
+]
 ManeuverNames = Annotated[
     tuple[str, ...],
     several(
         "NAME|FILE ...",
+        completer=_MANEUVERS,
         help="Maneuvers and recordings, by name or cue CSV file; `all` for every one of them.",
     ),
 ]
-PlatformName = Annotated[str, option("NAME|FILE", help="Motion base, by name or YAML file.")]
-CarName = Annotated[str, option("NAME|FILE", help="Car, by name or YAML file.")]
+PlatformName = Annotated[
+    str, option("NAME|FILE", completer=named("Motion bases"), help="Motion base, by name or YAML file.")
+]
+CarName = Annotated[str, option("NAME|FILE", completer=named("Cars"), help="Car, by name or YAML file.")]
 OutFolder = Annotated[Path, option("DIR", help="Folder for everything that is written; made if missing.")]
 Workers = Annotated[
     int, option("N", converter=whole_number, help="Processes or threads that work at a time.")

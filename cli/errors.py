@@ -107,6 +107,8 @@ def _missing(command: str, error: MissingArgumentError, argument: Argument) -> s
     strange = next((w for w in words if w.startswith("--") and w.split("=", 1)[0] not in flags), None)
     if strange is not None:
         return _unknown(command, strange, flags)
+    if argument.name == "--algorithm" and words and not words[0].startswith("-"):
+        return f"the algorithm is named by an option now: --algorithm {words[0]}."
     metavar = (getattr(argument.parameter, "metavar", None) or "").removesuffix(" ...")
     return f"{argument.name} must be given{': ' if metavar else ''}{metavar}."
 

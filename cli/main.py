@@ -255,7 +255,12 @@ def _dispatch(arguments: list[str]) -> int:
         print(f"{PROGRAM} {version('motion-cueing-gym')}")
         return SUCCESS
     if name == "--print-completion":
-        print(_completion(rest))
+        shell = look_up("shell", rest[0] if rest else "", {shell: shell for shell in SHELLS})
+        print(_whole().generate_completion(prog_name=PROGRAM, shell=shell))  # type: ignore[arg-type]
+        return SUCCESS
+    if name == "__complete":
+        # The script of --print-completion asks for names.
+        _whole()(arguments, result_action="return_none")
         return SUCCESS
     if name.startswith("-"):
         raise ConfigurationError(f"a command comes first, found {name}. See `{PROGRAM} --help`")
@@ -367,16 +372,11 @@ def _shown(value: Any) -> str | None:
     return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
-def _completion(arguments: Sequence[str]) -> str:
-    """A script that completes commands and options.
-
-    Raises:
-        ConfigurationError: there is none for the shell.
-    """
+def _whole() -> App:
+    """All commands in one parser, as completion needs it."""
     from cyclopts import App
 
-    shell = look_up("shell", arguments[0] if arguments else "", {shell: shell for shell in SHELLS})
     whole = App(name=PROGRAM, version_flags=("--version",))
     for name in COMMANDS:
         whole.command(app_of(name, prefix=""))
-    return whole.generate_completion(prog_name=PROGRAM, shell=shell)  # type: ignore[arg-type]
+    return whole

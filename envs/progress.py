@@ -146,7 +146,7 @@ def compilation_announced() -> Iterator[None]:
     Warp compiles into a folder of its cache whose name has the number of the process; a thread looks for it.
     """
     over = threading.Event()
-    watch = threading.Thread(target=_watch_cache, args=(over,), name="kernels", daemon=True)
+    watch = threading.Thread(target=watch_cache, args=(over,), name="kernels", daemon=True)
     watch.start()
     try:
         yield
@@ -155,7 +155,12 @@ def compilation_announced() -> Iterator[None]:
         watch.join()
 
 
-def _watch_cache(over: threading.Event) -> None:
+def watch_cache(over: threading.Event) -> None:
+    """Look into Warp's cache until this process compiles there, and say so.
+
+    Args:
+        over: Ends it.
+    """
     mark = f"_p{os.getpid()}_"
     while not over.wait(_LOOK):
         warp = sys.modules.get("warp")

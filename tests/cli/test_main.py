@@ -447,6 +447,12 @@ def test_a_shell_is_told_what_there_is(shell, capsys):
     assert "unknown shell 'tcsh'" in capsys.readouterr().err
 
 
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="Cyclopts 4, for Python 3.10, completes no names")
+def test_a_shell_asks_for_names(capsys):
+    assert main(["__complete", "evaluate", "--policies", ""]) == 0
+    assert "classical-tuned\tclassical at its best" in capsys.readouterr().out
+
+
 def test_results_are_json_for_other_tools(simulator, cue_file, tmp_path):
     main(["evaluate", "--maneuvers", str(cue_file), "--out", str(tmp_path / "out")])
     values = json.loads((tmp_path / "out" / "results.json").read_text())
