@@ -46,7 +46,7 @@ def main(steps: str = "200000", maneuver: str = "lane-change") -> None:
     cues = get_maneuver(maneuver).drive()
     for policy in (ClassicalWashout(), Agent.load(FILE)):
         print(f"{policy.name:<20} J = {measure(rollout(policy, cues)).cue_error:6.3f}")
-    print(f"motion-cueing evaluate --policy {FILE} classical")
+    print(f"motion-cueing evaluate --policies {FILE} classical")
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ class Algorithm:
     """A way to train.
 
     Args:
-        name: As ``--algo`` takes it.
+        name: As ``--algorithm`` takes it.
         module: Its module, by full name; has ``make_learner(config) -> Learner``.
         summary: One line.
         needs: Modules of other projects that it imports.
@@ -141,7 +141,7 @@ for _algorithm in (
 
 
 def algorithm_names() -> list[str]:
-    """Names ``--algo`` takes."""
+    """Names ``--algorithm`` takes."""
     return list(_ALGORITHMS)
 
 

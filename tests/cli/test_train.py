@@ -104,6 +104,7 @@ def test_the_same_command_goes_on_and_fresh_begins_anew(tmp_path, capsys):
             [session["steps"] for session in json.loads((out / "run.json").read_text())["sessions"]]
         )
     assert sessions == [[0], [0, 64], [0]]
+    capsys.readouterr()
     for more, told in (
         (
             ["--seed", "9"],
