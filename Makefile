@@ -28,10 +28,10 @@ help: ## List the targets
 
 evaluate: $(BASE) ## All maneuvers with the default policies, and the paper's cases: tables, figures, reports
 	@$(BIN)/motion-cueing evaluate --out $(OUT)
-	@$(BIN)/motion-cueing evaluate --paper --out $(OUT)/paper
+	@$(BIN)/motion-cueing paper --out $(OUT)/paper
 
 paper: $(BASE) ## Reproduce the paper's six cases, with a pass or a fail for each number
-	@$(BIN)/motion-cueing evaluate --paper --out $(OUT)/paper
+	@$(BIN)/motion-cueing paper --out $(OUT)/paper
 
 test: lint types unit ## Lint, check types and run the tests
 

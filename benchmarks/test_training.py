@@ -74,7 +74,7 @@ def test_plain_environment(benchmark, batch, epochs, rollouts):
 
 
 def test_preset(benchmark):
-    """As ``motion-cueing train --algo ppo``: an action is several time steps, each with the washout."""
+    """As ``motion-cueing train --algorithm ppo``: an action is several time steps, each with the washout."""
     config = load_config("ppo")
     episode = replace(config.task.episode, library=DRIVES)
     n = ROLLOUTS * int(str(config.hyperparameters["n_steps"]))

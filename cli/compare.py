@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import FlagCreatePairsOff, arg
+from .arguments import (
+    ALL,
+    BENCHMARK,
+    CarName,
+    Fresh,
+    ManeuverNames,
+    Names,
+    OutFolder,
+    PolicyNames,
+    find_car,
+    find_maneuvers,
+    find_platforms,
+    find_policies,
+)
 
-from ..envs.errors import ConfigurationError
-from ..evaluation.benchmark import BENCHMARK
-from ..evaluation.reporting.text import words_of
-from ..evaluation.selection import ALL, find_car, find_maneuvers, find_platform, find_policies
-from .studies import prepare, run_and_save
 
-if TYPE_CHECKING:
-    from ..envs.platform import Platform
-
-Name = Annotated[str, arg(metavar="NAME|FILE")]
-Names = Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CompareCommand:
     """Drive maneuvers on several machines with several policies: how much machine does a controller need?
 
@@ -31,18 +31,13 @@ class CompareCommand:
 
     platforms: Names = (ALL,)
     """Motion bases, by name or YAML file; `all` for every whole one."""
-    policies: Names = (BENCHMARK,)
-    """Policies, by name or file; `benchmark` for every controller."""
-    maneuvers: Names = (ALL,)
-    """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
-    ablations: Annotated[bool, FlagCreatePairsOff] = False
+    policies: PolicyNames = (BENCHMARK,)
+    maneuvers: ManeuverNames = (ALL,)
+    ablations: bool = False
     """Also each machine without its turntable, without its carriage, and with its hexapod alone."""
-    car: Name = "sedan"
-    """Car, by name or YAML file."""
-    out: Annotated[Path, arg(metavar="DIR")] = Path("comparison")
-    """Folder for everything that is written; made if missing."""
-    fresh: Annotated[bool, FlagCreatePairsOff] = False
-    """Drive everything again."""
+    car: CarName = "sedan"
+    out: OutFolder = Path("comparison")
+    fresh: Fresh = False
 
 
 def run(command: CompareCommand) -> int:
@@ -51,24 +46,18 @@ def run(command: CompareCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    from ..evaluation.policies import make_policy
+    from ..evaluation.reporting.text import words_of
     from ..evaluation.studies.figures import lines_figure
-    from ..evaluation.studies.study import Condition
+    from ..evaluation.studies.study import Condition, policy_on
+    from .studies import prepare, run_and_save
 
-    machines = find_machines(command)
+    machines = find_platforms(command.platforms, command.ablations)
     car = find_car(command.car)
     maneuvers = find_maneuvers(command.maneuvers, car)
     policies = find_policies(command.policies, next(iter(machines.values())))
     prepare(command.out, command.fresh)
     conditions = [
-        Condition(
-            name,
-            machine.description,
-            machine,
-            car,
-            maneuvers,
-            partial(make_policy, platform=machine, force=True),
-        )
+        Condition(name, machine.description, machine, car, maneuvers, partial(policy_on, platform=machine))
         for name, machine in machines.items()
     ]
     return run_and_save(
@@ -80,23 +69,3 @@ def run(command: CompareCommand) -> int:
         False,
         lines_figure,
     )
-
-
-def find_machines(command: CompareCommand) -> dict[str, Platform]:
-    """The machines of a command by label, each followed by its ablations if they are asked for.
-
-    Raises:
-        MotionCueingError: there is no such machine, or two have one name.
-    """
-    from ..envs.platform import ablations, platform_names
-
-    named = [name for given in command.platforms for name in (platform_names() if given == ALL else [given])]
-    found: dict[str, Platform] = {}
-    for name in dict.fromkeys(named):
-        machine = find_platform(name)
-        for one in [machine, *(ablations(machine) if command.ablations else ())]:
-            if found.setdefault(one.name, one) != one:
-                raise ConfigurationError(
-                    f"two motion bases have the name {one.name!r}; rename one in its file"
-                )
-    return found

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from tyro.conf import Positional, arg
 
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.storage import check_file, replacing
-from ..evaluation.reporting.figures import line_styles, new_figure, styled
+from .arguments import option, several
 
 Curve = NDArray[np.float64]
 """(2, k) steps and values."""
@@ -26,7 +25,7 @@ _INSIDE: Final = 4
 _MILLION: Final = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CurvesCommand:
     """Draw a scalar of the log of one or more trainings.
 
@@ -34,9 +33,9 @@ class CurvesCommand:
     line for their mean, and a band from the lowest to the highest.
     """
 
-    runs: Positional[tuple[Path, ...]]
+    runs: Annotated[tuple[Path, ...], several("DIR ...")] = field(kw_only=False)
     """Folders that `motion-cueing train` made."""
-    out: Annotated[Path, arg(metavar="FILE.png|FILE.svg")]
+    out: Annotated[Path, option("FILE.png|FILE.svg")]
     """Picture to write."""
     scalar: str = "validation/J"
     """Column of log.csv."""
@@ -49,8 +48,8 @@ def run(command: CurvesCommand) -> int:
         ConfigurationError: no folder, another kind of picture, or a scalar that no log has.
         DataError: a log is missing or broken.
     """
-    if not command.runs:
-        raise ConfigurationError("RUNS: name at least one folder of a training")
+    from ..evaluation.reporting.figures import styled
+
     if command.out.suffix not in _SUFFIXES:
         raise ConfigurationError(f"--out {command.out}: name a file that ends in {' or '.join(_SUFFIXES)}")
     check_file("--out", command.out)
@@ -94,6 +93,8 @@ def grouped(curves: Mapping[Path, Curve]) -> dict[str, list[Curve]]:
 
 def draw(groups: Mapping[str, list[Curve]], scalar: str) -> Any:
     """A figure with a line and a band for each group."""
+    from ..evaluation.reporting.figures import line_styles, new_figure
+
     figure = new_figure(6.4, 3.4)
     axes = figure.subplots()
     styles = line_styles(list(groups))

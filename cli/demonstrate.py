@@ -5,53 +5,55 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from tyro.conf import arg
-
-from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError
-from ..envs.provenance import command_line, commit, hardware, now, versions
-from ..envs.settings import to_dict
+from ..envs.progress import drives_progress
 from ..envs.storage import check_folder
-from ..evaluation.demonstrations import Demonstrator, demonstrate
-from ..evaluation.metrics import measure
-from ..evaluation.reporting.text import number
-from ..evaluation.rollout import statistics_of
-from ..evaluation.selection import find_car, find_maneuvers, find_platform
-from ..evaluation.suite import CueSource, suite_progress
-from ..train.algorithms.dagger.demonstrations import INDEX, DriveEntry, Index, is_kept, load_index, save_drive
+from .arguments import (
+    CarName,
+    Fresh,
+    ManeuverNames,
+    OutFolder,
+    PlatformName,
+    PolicyName,
+    Whole,
+    find_car,
+    find_maneuvers,
+    find_platform,
+)
 
-_SUCCESS: Final = 0
+if TYPE_CHECKING:
+    from ..envs.cues import CueTrace
+    from ..evaluation.demonstrations import Demonstrator
+    from ..evaluation.suite import CueSource
+    from ..train.algorithms.dagger.demonstrations import DriveEntry, Index
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DemonstrateCommand:
     """Record drives of a controller as a dataset for learning.
 
-    Writes one .npz file a drive and index.json; see docs/demonstrations.md. The same command again goes on
-    where it was stopped.
+    Writes one .npz file a drive and index.json; see docs/demonstrations.md. Name drives with --maneuvers, ask
+    for random ones with --drives, or both.
     """
 
-    policy: Annotated[str, arg(metavar="NAME|FILE")] = "optimum"
-    """Controller, by name or file."""
+    policy: PolicyName = "optimum"
     objective: Literal["J", "perceived"] = "J"
-    """What the optimum minimizes: J, or J of what the driver senses."""
-    maneuver: Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")] = ()
-    """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them; default: none."""
-    random: int = 0
-    """Random drives beside them."""
-    seed: int = 0
+    """What the optimum minimizes: J, or J of the perceived cues."""
+    maneuvers: ManeuverNames = ()
+    drives: Whole = 0
+    """Random drives."""
+    seed: Whole = 0
     """Of the random drives."""
     duration: float = 60.0
     """Of a random drive, s."""
-    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
-    """Motion base, by name or YAML file."""
-    car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
-    """Car that drives named maneuvers, by name or YAML file."""
-    out: Annotated[Path, arg(metavar="DIR")] = Path("demonstrations")
-    """Folder of the dataset; made if missing."""
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
+    out: OutFolder = Path("demonstrations")
+    fresh: Fresh = False
 
 
 def run(command: DemonstrateCommand) -> int:
@@ -60,6 +62,8 @@ def run(command: DemonstrateCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong, or the folder holds another recording.
     """
+    from ..evaluation.demonstrations import Demonstrator
+
     check_folder("--out", command.out)
     platform = find_platform(command.platform)
     demonstrator = Demonstrator.of(_policy_name(command), platform)
@@ -67,7 +71,7 @@ def run(command: DemonstrateCommand) -> int:
     index = _index(command, _setting(command, demonstrator))
     index.save(command.out)
     recorded = 0
-    with suite_progress(len(sources)) as advance:
+    with drives_progress(len(sources)) as advance:
         for name, source in sources.items():
             advance(name, demonstrator.name)
             cues = _cues(name, source).resampled(demonstrator.time_step)
@@ -77,11 +81,13 @@ def run(command: DemonstrateCommand) -> int:
             index.save(command.out)
             recorded += 1
     print(_summary(command.out, index, recorded))
-    return _SUCCESS
+    return 0
 
 
 def _is_done(folder: Path, index: Index, name: str, cues: CueTrace) -> bool:
     """Whether the drive of a name is there, and is of these cues; says so if it is of others."""
+    from ..train.algorithms.dagger.demonstrations import is_kept
+
     kept = next((entry for entry in index.drives if entry.name == name), None)
     if kept is None or not is_kept(folder, kept):
         return False
@@ -101,24 +107,22 @@ def _policy_name(command: DemonstrateCommand) -> str:
 
 def _sources(command: DemonstrateCommand) -> dict[str, CueSource]:
     """Cues by the name of the drive."""
-    if command.random < 0:
-        raise ConfigurationError(f"--random must not be negative, found {command.random}")
-    if not command.maneuver and not command.random:
+    if command.drives < 0:
+        raise ConfigurationError(f"--drives must not be negative, found {command.drives}")
+    if not command.maneuvers and not command.drives:
         raise ConfigurationError(
-            "nothing to drive: name drives with --maneuver, or ask for random ones with --random"
+            "nothing to drive: name drives with --maneuvers, or ask for random ones with --drives"
         )
-    sources = dict(find_maneuvers(command.maneuver, find_car(command.car)))
-    if command.random:
+    sources = dict(find_maneuvers(command.maneuvers, find_car(command.car)))
+    if command.drives:
         sources |= dict(_random_sources(command))
     return sources
 
 
 def _random_sources(command: DemonstrateCommand) -> Iterator[tuple[str, CueSource]]:
-    from functools import partial
+    from ..envs.maneuvers.random_drives import RandomDrives, drive_seeds, random_drive
 
-    from ..envs.maneuvers.sampling import RandomDrives, drive_seeds, random_drive
-
-    for seed in drive_seeds(command.random, command.seed):
+    for seed in drive_seeds(command.drives, command.seed):
         name = RandomDrives().plan(seed, command.duration).name
         yield f"{name}-{command.duration:g}s", partial(random_drive, seed, command.duration)
 
@@ -131,6 +135,8 @@ def _cues(name: str, source: CueSource) -> CueTrace:
 
 
 def _setting(command: DemonstrateCommand, demonstrator: Demonstrator) -> dict[str, Any]:
+    from ..envs.settings import to_dict
+
     return {
         "policy": demonstrator.name,
         "parameters": demonstrator.parameters,
@@ -142,12 +148,25 @@ def _setting(command: DemonstrateCommand, demonstrator: Demonstrator) -> dict[st
 
 
 def _index(command: DemonstrateCommand, setting: dict[str, Any]) -> Index:
-    """The folder's index, or a new one."""
+    """The folder's index, or a new one; with ``--fresh`` the drives of the old one are removed.
+
+    Raises:
+        ConfigurationError: the folder holds drives of another controller, car or motion base.
+    """
+    from ..train.algorithms.dagger.demonstrations import INDEX, Index, load_index
+    from ..train.provenance import command_line, commit, hardware, now, versions
+
     if (command.out / INDEX).exists():
         index = load_index(command.out)
+        if command.fresh:
+            for drive in index.drives:
+                (command.out / drive.file).unlink(missing_ok=True)
+            (command.out / INDEX).unlink()
+            return _index(command, setting)
         if index.setting != json.loads(json.dumps(setting)):
             raise ConfigurationError(
-                f"{command.out} holds drives of another controller, car or motion base; name another --out"
+                f"{command.out} holds drives of another controller, car or motion base; name another "
+                "--out, or add --fresh to begin anew"
             )
         return index
     provenance = {
@@ -161,6 +180,11 @@ def _index(command: DemonstrateCommand, setting: dict[str, Any]) -> Index:
 
 
 def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator) -> DriveEntry:
+    from ..evaluation.demonstrations import demonstrate
+    from ..evaluation.metrics import measure
+    from ..evaluation.rollout import notes_of
+    from ..train.algorithms.dagger.demonstrations import DriveEntry, save_drive
+
     record, drive = demonstrate(demonstrator, name, cues)
     found = measure(record)
     file = f"{name}.npz"
@@ -174,11 +198,13 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
         cue_error=found.cue_error,
         perceived_cue_error=found.perceived_cue_error,
         at_limit=found.at_limit,
-        notes=statistics_of(record.metadata),
+        notes=notes_of(record.metadata),
     )
 
 
 def _summary(folder: Path, index: Index, recorded: int) -> str:
+    from ..evaluation.reporting.text import number
+
     steps = sum(entry.steps for entry in index.drives)
     mean = sum(entry.cue_error for entry in index.drives) / max(len(index.drives), 1)
     return f"{folder}: {len(index.drives)} drives ({recorded} new), {steps} steps, mean J {number(mean)}"

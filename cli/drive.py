@@ -5,25 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from tyro.conf import arg
-
-from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.storage import check_file
-from ..evaluation.reporting.text import words_of
-from ..evaluation.selection import find_car, find_maneuvers, find_platform
-from ..realtime.client import Client, NetworkFaults, cues_at
-from ..realtime.packets import make_format
-from ..realtime.report import report_of, show
-from ..realtime.server import Endpoint, address_of, is_loopback
-from ..realtime.timing import undisturbed
-from ..train.training import Interrupt
+from .arguments import CarName, ManeuverName, Name, Whole, find_car, find_maneuver, find_platform, option
 from .serve import DEFAULT_PORT
 
+if TYPE_CHECKING:
+    from ..realtime.client import Client
+    from ..realtime.server import Endpoint
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, kw_only=True)
 class DriveCommand:
     """Drive a controller that `motion-cueing serve` runs: send cues in real time, check what comes back.
 
@@ -31,18 +25,16 @@ class DriveCommand:
     describes the packets.
     """
 
-    maneuver: Annotated[str, arg(metavar="NAME|FILE")] = "double-lane-change"
-    """Maneuver or recording, by name or cue CSV file."""
-    to: Annotated[str, arg(metavar="HOST[:PORT]")] = f"127.0.0.1:{DEFAULT_PORT}"
+    maneuver: ManeuverName = "double-lane-change"
+    to: Annotated[str, option("HOST[:PORT]")] = f"127.0.0.1:{DEFAULT_PORT}"
     """Where the controller listens."""
-    rate: int = 1000
+    rate: Whole = 1000
     """Packets a second; also the rate of the set-points that are expected."""
-    times: int = 1
+    times: Whole = 1
     """How often the maneuver is driven, one behind the other."""
-    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
+    platform: Name = "paper"
     """Motion base of the controller, by name or YAML file, for its limits."""
-    car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
-    """Car, by name or YAML file."""
+    car: CarName = "sedan"
     format: Literal["floats", "msgpack"] = "floats"
     """How packets are written; as the controller's."""
     drop: float = 0.0
@@ -53,13 +45,13 @@ class DriveCommand:
     """Share that is sent up to 50 ms late, out of order."""
     nan: float = 0.0
     """Share with a NaN in it."""
-    seed: int = 0
+    seed: Whole = 0
     """Of what happens to packets."""
     after: float = 1.0
     """Time to go on listening after the last packet, s."""
-    cpu: int | None = None
+    cpu: Whole | None = None
     """Core to run on alone."""
-    report: Annotated[Path | None, arg(metavar="FILE.json")] = None
+    report: Annotated[Path | None, option("FILE.json")] = None
     """Counts and timings to write."""
 
 
@@ -69,15 +61,21 @@ def run(command: DriveCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
+    from ..realtime.client import Client, Trouble, cues_at
+    from ..realtime.packets import make_format
+    from ..realtime.server import Endpoint, address_of, is_loopback
+    from ..realtime.timing import undisturbed
+    from ..train.training import Interrupt
+
     _check(command)
-    trace = _trace(command)
+    trace = find_maneuver(command.maneuver, find_car(command.car))[1]()
     to = address_of(command.to, DEFAULT_PORT)
-    network = NetworkFaults(command.drop, command.repeat, command.late, command.nan, command.seed)
+    trouble = Trouble(command.drop, command.repeat, command.late, command.nan, command.seed)
     # From the loopback address nothing leaves this machine; other targets are reached from any.
     endpoint = Endpoint(("127.0.0.1" if is_loopback(to) else "0.0.0.0", 0))
     try:
         platform, form = find_platform(command.platform), make_format(command.format)
-        client = Client(endpoint, to, form, platform, command.rate, network)
+        client = Client(endpoint, to, form, platform, command.rate, trouble)
         interrupt = Interrupt()
         with interrupt.caught(), undisturbed(command.cpu):
             client.run(cues_at(trace, command.rate, command.times), lambda: interrupt.asked)
@@ -94,15 +92,12 @@ def _check(command: DriveCommand) -> None:
         check_file("--report", command.report)
 
 
-def _trace(command: DriveCommand) -> CueTrace:
-    sources = find_maneuvers((command.maneuver,), find_car(command.car))
-    if len(sources) != 1:
-        raise ConfigurationError(f"--maneuver {command.maneuver} means several drives; name one")
-    (source,) = sources.values()
-    return source()
-
-
 def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
+    from ..evaluation.reporting.text import words_of
+    from ..realtime.report import report_of, tell
+
+    if not client.counts["received"]:
+        raise OSError(None, "nothing came back; is `motion-cueing serve` running there?", command.to)
     report = report_of(
         words_of("drive", command),
         client,
@@ -111,5 +106,5 @@ def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
         states=client.states,
         faults=client.faults,
     )
-    show(report, "set-points", command.report)
-    return 0 if client.counts["received"] and not client.counts["outside_limits"] else 1
+    tell(report, "set-points", command.report)
+    return 1 if client.counts["outside_limits"] else 0

@@ -9,29 +9,32 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from tyro.conf import FlagCreatePairsOff, arg
-
 from ..envs.errors import ConfigurationError
+from ..envs.progress import progress
 from ..envs.storage import check_folder, check_own_json
-from ..evaluation.reporting.text import how_many, print_table, save_markdown, table_console, words_of
-from ..evaluation.selection import find_platform, find_policies
+from .arguments import (
+    Fresh,
+    OutFolder,
+    PlatformName,
+    PolicyNames,
+    Whole,
+    find_platform,
+    find_policies,
+    option,
+    several,
+)
 
 if TYPE_CHECKING:
     from ..evaluation.endurance import Endurance
     from ..evaluation.endurance.results import EnduranceResults
-    from ..evaluation.endurance.run import EnduranceOutcome, EnduranceRequest
-    from ..evaluation.endurance.run import Progress as Tell
+    from ..evaluation.endurance.run import Asked, Found, Tell
 
 _WITHSTOOD: Final = 0
 _FAILED: Final = 1
 _INTERRUPTED: Final = 130
 
-Name = Annotated[str, arg(metavar="NAME|FILE")]
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EndureCommand:
     """Drive policies for hours and count what they exceed.
 
@@ -41,31 +44,27 @@ class EndureCommand:
     The exit status is 1 if a limit was exceeded or an action was not finite.
     """
 
-    policy: Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")] = ("learned-preview",)
-    """Policies, by name or file."""
+    policies: PolicyNames = ("learned-preview",)
     hours: float = 1.0
     """Of drives."""
-    seed: int = 0
+    seed: Whole = 0
     """Of the drives."""
-    only: Annotated[tuple[int, ...], arg(metavar="SEED ...")] = ()
+    seeds: Annotated[tuple[int, ...], several("SEED ...")] = ()
     """Drive these, by the number in their names, and write their cues as CSV; default: as many as fill the
     hours."""
     duration: float = 120.0
     """Of a drive, s."""
-    platform: Name = "paper"
-    """Motion base, by name or YAML file."""
-    friction: tuple[float, float] = (0.7, 1.0)
+    platform: PlatformName = "paper"
+    friction: Annotated[tuple[float, float], option("LOW HIGH")] = (0.7, 1.0)
     """Range of a factor on the tires' friction."""
-    lag: tuple[float, float] = (30.0, 90.0)
+    lag: Annotated[tuple[float, float], option("LOW HIGH")] = (30.0, 90.0)
     """Range of the natural frequency of the actuators' lag, rad/s."""
-    dead_time: tuple[float, float] = (0.0, 0.05)
+    dead_time: Annotated[tuple[float, float], option("LOW HIGH")] = (0.0, 0.05)
     """Range of the actuators' dead time, s."""
-    envs: int = 256
+    envs: Whole = 256
     """Drives side by side."""
-    out: Annotated[Path, arg(metavar="DIR")] = Path("endurance")
-    """Folder for everything that is written; made if missing."""
-    fresh: Annotated[bool, FlagCreatePairsOff] = False
-    """Drive again what these policies have driven."""
+    out: OutFolder = Path("endurance")
+    fresh: Fresh = False
 
 
 def run(command: EndureCommand) -> int:
@@ -74,10 +73,10 @@ def run(command: EndureCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    from ..evaluation.endurance.run import EnduranceRun
+    from ..evaluation.endurance.run import Run
 
     asked = _asked(command)
-    driving = EnduranceRun(asked, command.fresh)
+    driving = Run(asked, command.fresh)
     with _progress(driving.seconds) as tell:
         found = driving.drive(tell)
     results = _results(command, asked, found)
@@ -88,9 +87,9 @@ def run(command: EndureCommand) -> int:
     return _WITHSTOOD if all(one.withstood for one in results.summaries.values()) else _FAILED
 
 
-def _asked(command: EndureCommand) -> EnduranceRequest:
+def _asked(command: EndureCommand) -> Asked:
     from ..envs.maneuvers import drive_seeds
-    from ..evaluation.endurance.run import EnduranceRequest
+    from ..evaluation.endurance.run import Asked
 
     for name, value in (("hours", command.hours), ("duration", command.duration), ("envs", command.envs)):
         if not 0 < value < math.inf:
@@ -99,11 +98,11 @@ def _asked(command: EndureCommand) -> EnduranceRequest:
     check_own_json("--out", command.out / "endurance.json", frozenset({"schema", "endurance"}))
     platform = find_platform(command.platform)
     count = math.ceil(3600.0 * command.hours / command.duration)
-    return EnduranceRequest(
+    return Asked(
         endurance=_endurance(command),
         platform=platform,
-        policies=find_policies(command.policy, platform),
-        seeds=command.only or drive_seeds(count, command.seed),
+        policies=find_policies(command.policies, platform),
+        seeds=command.seeds or drive_seeds(count, command.seed),
         batch=command.envs,
         folder=command.out,
     )
@@ -127,26 +126,25 @@ def _progress(seconds: float) -> Iterator[Tell]:
     from ..train.training import Interrupt
 
     interrupt = Interrupt()
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f} %"))
-    times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    with interrupt.caught(), Progress(*columns, *times, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=seconds)
+    with interrupt.caught(), progress(seconds, "s of drives") as bar:
 
         def tell(what: str, done: float) -> None:
-            bar.update(task, description=what, advance=done)
+            bar.move(text=what, advance=done)
             if interrupt.asked:
                 raise Stopped
 
         yield tell
 
 
-def _results(command: EndureCommand, asked: EnduranceRequest, found: EnduranceOutcome) -> EnduranceResults:
+def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceResults:
     from ..envs.simulator.simulator import TIME_STEP
     from ..evaluation.endurance.results import EnduranceResults, summarized
+    from ..evaluation.provenance import head_of
+    from ..evaluation.reporting.text import words_of
 
     driven = {name: one for name, one in found.policies.items() if one.drives}
     return EnduranceResults(
-        **EnduranceResults.head(words_of("endure", command)),
+        **head_of(EnduranceResults, words_of("endure", command)),
         platform=asked.platform.name,
         endurance=asked.endurance,
         finished=found.finished,
@@ -155,25 +153,27 @@ def _results(command: EndureCommand, asked: EnduranceRequest, found: EnduranceOu
     )
 
 
-def _write(command: EndureCommand, asked: EnduranceRequest, results: EnduranceResults) -> None:
+def _write(command: EndureCommand, asked: Asked, results: EnduranceResults) -> None:
     from ..evaluation.endurance.results import tables
     from ..evaluation.endurance.run import seeded_drives
+    from ..evaluation.reporting.text import save_markdown
 
     results.save_json(command.out / "endurance.json")
     results.save_csv(command.out / "endurance.csv")
     save_markdown(command.out / "endurance.md", *tables(results))
-    for drive in seeded_drives(asked.endurance, command.only):
+    for drive in seeded_drives(asked.endurance, command.seeds):
         drive.cues.to_csv(command.out / f"{drive.cues.name}.csv")
 
 
-def _print(command: EndureCommand, results: EnduranceResults, found: EnduranceOutcome) -> None:
+def _print(command: EndureCommand, results: EnduranceResults, found: Found) -> None:
     from ..evaluation.endurance.results import tables
+    from ..evaluation.reporting.text import how_many, print_table, table_console
 
     console = table_console()
     for table in tables(results):
         print_table(console, table)
-    if found.skipped:
-        told = how_many(len(found.skipped), "drive")
+    if found.left_out:
+        told = how_many(len(found.left_out), "drive")
         console.print(f"{told} left out: the car left the range of its model", highlight=False)
     state = "" if found.finished else "interrupted, the same command goes on; "
     console.print(

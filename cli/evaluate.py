@@ -2,73 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import FlagCreatePairsOff, arg
-
-from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, MotionCueingError
+from ..envs.errors import ConfigurationError
+from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
-from ..evaluation.benchmark import BENCHMARK, benchmark_table, save_benchmark
-from ..evaluation.reporting.figures import benchmark_figure, maneuver_figure, png
-from ..evaluation.reporting.report import save_report
-from ..evaluation.reporting.tables import print_results
-from ..evaluation.reporting.text import file_names, print_table, table_console, words_of
-from ..evaluation.results import Provenance, Results
-from ..evaluation.selection import ALL, find_car, find_maneuvers, find_platform, find_policies
-from ..evaluation.suite import (
-    DRIVEN,
-    CueSource,
-    Drive,
-    Outcome,
-    cue_sources,
-    load_drives,
-    run_suite,
-    suite_progress,
-)
-from ..evaluation.trajectory import Trajectory
+from . import arguments
+from .arguments import ALL, BENCHMARK, CarName, ManeuverNames, OutFolder, PlatformName, PolicyNames, several
 
 if TYPE_CHECKING:
     from ..envs.car import Car
+    from ..envs.cues import CueTrace
     from ..envs.platform import Platform
-
-Name = Annotated[str, arg(metavar="NAME|FILE")]
-Names = Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
-Files = Annotated[tuple[Path, ...], arg(metavar="FILE.npz ...")]
-Folder = Annotated[Path, arg(metavar="DIR")]
+    from ..evaluation.results import Results
+    from ..evaluation.suite import CueSource, Drive, Outcome
+    from ..evaluation.trajectory import Trajectory
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EvaluateCommand:
     """Drive maneuvers with policies, and say which policy is better, by how much, and why.
 
     Writes results.json, results.csv, report.html, the benchmark over all maneuvers, one figure a maneuver,
-    and every trajectory.
-    `motion-cueing list` shows all names.
+    and every trajectory. Without --policies it drives the ones that are meant for comparison.
     """
 
-    policy: Names = ()
-    """Policies, by name or file; default: the ones meant for comparison; `benchmark` for all controllers."""
-    maneuver: Names = (ALL,)
-    """Maneuvers and recordings, by name or cue CSV file; `all` for every one of them."""
-    replay: Files = ()
+    policies: PolicyNames = ()
+    maneuvers: ManeuverNames = (ALL,)
+    replays: Annotated[tuple[Path, ...], several("FILE.npz ...")] = ()
     """Drives to score as they were driven, and their cues to drive: logs of `motion-cueing serve`."""
-    platform: Name = "paper"
-    """Motion base, by name or YAML file."""
-    car: Name = "sedan"
-    """Car, by name or YAML file."""
-    out: Folder = Path("results")
-    """Folder for everything that is written; made if missing."""
-    paper: Annotated[bool, FlagCreatePairsOff] = False
-    """Make the six cases and the figures of the paper instead, with a pass or a fail for each number."""
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
+    out: OutFolder = Path("results")
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a command asks for, all names resolved.
+    """An evaluation, all names resolved.
 
     Args:
         maneuvers: Sources of cues by label.
@@ -77,7 +51,7 @@ class Plan:
         car: The car.
         out: Folder of the output.
         arguments: The command line that asks for it.
-        left_out: Policies of the benchmark that cannot be driven here, and why.
+        skipped: Policies of the benchmark that cannot be driven here, and why.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -86,7 +60,7 @@ class Plan:
     car: Car
     out: Path
     arguments: tuple[str, ...]
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    skipped: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -103,10 +77,12 @@ class _Output:
 
     def finish(self, maneuver: str, drives: Mapping[str, Trajectory]) -> None:
         """Save trajectories and figure of a maneuver."""
+        from ..evaluation.reporting.figures import maneuver_figure
+
         for policy, drive in drives.items():
             name = f"{self.maneuvers[maneuver]}--{self.policies[policy]}.npz"
             drive.save(self.folder / "trajectories" / name)
-        self.figures[maneuver] = png(maneuver_figure(drives, list(self.policies)))
+        self.figures[maneuver] = maneuver_figure(drives, list(self.policies))
         write_bytes(self.folder / f"{self.maneuvers[maneuver]}.png", self.figures[maneuver])
 
 
@@ -116,126 +92,112 @@ def run(command: EvaluateCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    if command.paper:
-        return _run_paper(command)
-    plan = make_plan(command)
+    from ..evaluation.reporting.text import words_of
+
+    return report(make_plan(command, words_of("evaluate", command)), BENCHMARK in command.policies)
+
+
+def report(plan: Plan, ranked: bool) -> int:
+    """Drive, write and print; the exit status is 1 if a drive failed.
+
+    Args:
+        plan: What is driven.
+        ranked: Whether the table of the benchmark is printed as well.
+    """
+    from ..evaluation.benchmark import ladder_table
+    from ..evaluation.reporting.tables import print_results
+    from ..evaluation.reporting.text import print_table, table_console
+
     results, figures = evaluate(plan)
     save(results, figures, plan.out)
     console = table_console()
     print_results(console, results)
-    if BENCHMARK in command.policy and results.scores:
-        print_table(console, benchmark_table(results))
+    if ranked and results.standings:
+        print_table(console, ladder_table(results))
     console.print(
         f"Everything is in {plan.out}; open {plan.out / 'report.html'}", highlight=False, markup=False
     )
     return 1 if results.failures else 0
 
 
-def make_plan(command: EvaluateCommand) -> Plan:
+def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     """Resolve every name of a command before anything is driven.
+
+    Args:
+        command: Its arguments.
+        words: The command line, program first.
 
     Raises:
         UnknownNameError: a name is not registered.
         ConfigurationError: a YAML file has a wrong field.
         DataError: a file is missing or broken.
     """
-    if not command.maneuver:
-        raise ConfigurationError("--maneuver needs at least one name; `all` stands for every maneuver")
+    from ..evaluation.suite import DRIVEN, cue_sources, load_drives
+
     check_folder("--out", command.out)
     check_own_json("--out", command.out / "results.json", frozenset({"schema", "provenance"}))
-    platform, car = find_platform(command.platform), find_car(command.car)
-    recorded = _recorded(command, platform)
-    policies, left_out = _line_up(command, platform, car) if command.policy or not recorded else ({}, {})
+    platform, car = arguments.find_platform(command.platform), arguments.find_car(command.car)
+    if command.replays and command.maneuvers != EvaluateCommand().maneuvers:
+        raise ConfigurationError("--replays have their own cues; leave --maneuvers out")
+    recorded = load_drives(command.replays, platform)
+    drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
+    skipped: dict[str, str] = {}
+    if command.policies or not recorded:
+        policies, skipped = arguments.make_policies(command.policies, platform)
+        drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
-        maneuvers=cue_sources(recorded) if recorded else find_maneuvers(command.maneuver, car),
-        policies={**_as_driven(recorded), **policies},
+        maneuvers=cue_sources(recorded) if recorded else arguments.find_maneuvers(command.maneuvers, car),
+        policies=drives,
         platform=platform,
         car=car,
         out=command.out,
-        arguments=command_line(command),
-        left_out=left_out,
+        arguments=tuple(words),
+        skipped=skipped,
     )
 
 
-def _recorded(command: EvaluateCommand, platform: Platform) -> dict[str, Trajectory]:
-    """Drives by label that are not to be driven again."""
-    if command.replay and command.maneuver != EvaluateCommand().maneuver:
-        raise ConfigurationError("--replay has its own cues; leave --maneuver out")
-    return load_drives(command.replay, platform)
+def _drive(policy: Any, platform: Platform, car: Car, cues: CueTrace) -> Trajectory:
+    from ..evaluation.rollout import rollout
 
-
-def _as_driven(recorded: Mapping[str, Trajectory]) -> dict[str, Drive]:
-    """What gives the recorded drives, where there are any."""
-    return {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
-
-
-def _line_up(
-    command: EvaluateCommand, platform: Platform, car: Car
-) -> tuple[dict[str, Drive], dict[str, str]]:
-    """Drives by label, and the reasons of those left out; a policy that is asked for by its name must fit."""
-    drives: dict[str, Drive] = {}
-    left_out: dict[str, str] = {}
-    for label, name in find_policies(command.policy, platform).items():
-        try:
-            drives[label] = _drive_with(name, platform, car)
-        except MotionCueingError as error:
-            if BENCHMARK not in command.policy or name in command.policy:
-                raise
-            left_out[label] = str(error)
-    return drives, left_out
-
-
-def command_line(command: EvaluateCommand) -> tuple[str, ...]:
-    """The words that give this command: the options that differ from their default."""
-    return tuple(words_of("evaluate", command))
+    return rollout(policy, cues, platform=platform, car=car)
 
 
 def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
     """Drive and measure everything; figures by maneuver come beside the results."""
+    from ..evaluation.reporting.text import file_names
+    from ..evaluation.suite import run_suite
+
     output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies))
-    with suite_progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
+    with drives_progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
         outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance)
     return collect(plan, outcome), output.figures
 
 
 def collect(plan: Plan, outcome: Outcome) -> Results:
     """The results of an outcome, with what made them."""
-    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata)
-    return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.left_out, notes=outcome.notes)
+    from ..envs.settings import to_dict
+    from ..evaluation.provenance import provenance
+    from ..evaluation.results import Results
+
+    origin = provenance(
+        plan.arguments,
+        (plan.platform.name, to_dict(plan.platform)),
+        (plan.car.name, to_dict(plan.car)),
+        outcome.metadata,
+    )
+    return Results.of(outcome.maneuvers, outcome.failures, origin, left_out=plan.skipped, notes=outcome.notes)
 
 
 def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
     """Write results.json, results.csv, the benchmark and report.html into a folder."""
+    from ..evaluation.benchmark import save_ladder
+    from ..evaluation.reporting.figures import ladder_figure
+    from ..evaluation.reporting.report import save_report
+
     results.save_json(folder / "results.json")
     results.save_csv(folder / "results.csv")
-    figure = benchmark_figure(results)
-    image = None if figure is None else png(figure)
-    if image is not None:
-        save_benchmark(results, folder)
-        write_bytes(folder / "benchmark.png", image)
-    save_report(results, figures, folder / "report.html", image)
-
-
-def _drive_with(name: str, platform: Platform, car: Car) -> Drive:
-    from ..evaluation.policies import make_policy
-    from ..evaluation.rollout import rollout
-
-    policy = make_policy(name, platform)
-
-    def drive(cues: CueTrace) -> Trajectory:
-        return rollout(policy, cues, platform=platform, car=car)
-
-    return drive
-
-
-def _run_paper(command: EvaluateCommand) -> int:
-    own = replace(command, paper=False, out=EvaluateCommand().out)
-    if own != EvaluateCommand():
-        raise ConfigurationError(
-            "--paper has its own cases; leave --policy, --maneuver, --platform and --car out"
-        )
-    from ..evaluation.paper.cases import run as run_paper
-
-    check_folder("--out", command.out)
-    check_own_json("--out", command.out / "paper.json", frozenset({"schema", "checks"}))
-    return run_paper(command.out)
+    ladder = ladder_figure(results)
+    if ladder is not None:
+        save_ladder(results, folder)
+        write_bytes(folder / "ladder.png", ladder)
+    save_report(results, figures, folder / "report.html", ladder)

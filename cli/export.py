@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import arg
+from typing import TYPE_CHECKING, Annotated
 
 from ..envs.errors import ConfigurationError
 from ..envs.storage import check_file
-from ..train.agents import find_agent
+from .arguments import option
+
+if TYPE_CHECKING:
+    from ..train.agents import Agent
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ExportCommand:
     """Write an agent's network with its normalization as ONNX, check it, and time it.
 
     `motion-cueing list` shows the names of the agents that come with the package.
     """
 
-    policy: Annotated[str, arg(metavar="NAME|FILE.safetensors")]
+    policy: Annotated[str, option("NAME|FILE.safetensors")]
     """Agent, by name or file."""
-    onnx: Annotated[Path, arg(metavar="FILE.onnx")]
+    out: Annotated[Path, option("FILE.onnx")]
     """File to write."""
 
 
@@ -32,15 +33,15 @@ def run(command: ExportCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong, a package is missing, or the network computes something else.
     """
-    if command.onnx.suffix != ".onnx":
-        raise ConfigurationError(f"--onnx {command.onnx}: name a file that ends in .onnx")
-    check_file("--onnx", command.onnx)
-    agent = find_agent(command.policy)
+    if command.out.suffix != ".onnx":
+        raise ConfigurationError(f"--out {command.out}: name a file that ends in .onnx")
+    check_file("--out", command.out)
+    agent = _agent(command.policy)
     from ..train.agents.export import CHECKED, export_onnx
 
-    found = export_onnx(agent, command.onnx)
+    found = export_onnx(agent, command.out)
     network = agent.network
-    print(f"{command.onnx}: {agent.name}, {found.size / 1024:.0f} KiB")
+    print(f"{command.out}: {agent.name}, {found.size / 1024:.0f} KiB")
     print(f"observation (n, {network.size}) float32, action (n, {network.action_size}) in [-1, 1]")
     print(
         f"largest difference over {CHECKED:,} observations: {found.torch_difference:.1e} from PyTorch, "
@@ -51,3 +52,20 @@ def run(command: ExportCommand) -> int:
         f"max {1e6 * found.longest:.1f} us"
     )
     return 0
+
+
+def _agent(name: str) -> Agent:
+    """The agent of a name or file.
+
+    Raises:
+        MotionCueingError: it is another kind of policy, or there is none.
+    """
+    from ..evaluation.policies import find_agent, is_agent, policy_names
+    from ..train.agents import agent_names
+
+    if not is_agent(name) and (name in policy_names() or Path(name).suffix in (".yaml", ".yml")):
+        raise ConfigurationError(
+            f"--policy {name} is no trained network, but a washout or a predictive controller; "
+            f"what can be exported: {', '.join(agent_names())}, or the .safetensors file of an agent"
+        )
+    return find_agent(name)

@@ -1,110 +1,23 @@
-"""The picture of an import: whether the estimated mounting makes the record agree with itself."""
+"""``motion-cueing import``: a log of a drive becomes cues, with a picture of what was found."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from scipy.signal import welch
-from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+from cyclopts import Parameter
 
-from ..envs.cues import GRAVITY, Floats
 from ..envs.errors import ConfigurationError
 from ..envs.logs.columns import ImportOptions, parse_columns
-from ..envs.logs.importer import ImportedLog, import_log
-from ..envs.logs.mounting import SMOOTHING_HZ, correlation
-from ..envs.logs.timing import low_pass
 from ..envs.storage import check_file, write_bytes
-from ..evaluation.reporting.figures import new_figure, png, styled
+from .arguments import Whole, option, several
 
-_WINDOW_S = 20.0
-"""Length of a window of the spectra: resolves 0.05 Hz."""
-
-Names = tuple[str, str]
-
-
-def import_plot(imported: ImportedLog) -> bytes:
-    """PNG with the cues against the car's own motion, the raw signals, and spectra before and after."""
-    with styled():
-        figure = new_figure(12.0, 11.0)
-        figure.suptitle(f"{imported.trace.name}: what the import found")
-        _draw(figure, imported)
-        return png(figure)
-
-
-def _draw(figure: Figure, imported: ImportedLog) -> None:
-    axes = figure.subplots(4, 2)
-    trace = imported.trace
-    rate_hz = 1.0 / trace.dt
-    speed = trace.channels.get("speed_m_s")
-    along = None if speed is None else np.gradient(low_pass(speed, rate_hz, SMOOTHING_HZ), trace.dt)
-    across = None if speed is None else speed * trace.angular_velocity[:, 2]
-    _compare(axes[0, 0], trace.time, trace.specific_force[:, 0], along, ("f_x", "dv/dt"))
-    _compare(axes[1, 0], trace.time, trace.specific_force[:, 1], across, ("f_y", "v r"))
-    _scatter(axes[0, 1], trace.specific_force[:, 0], along, ("f_x", "dv/dt"), rate_hz)
-    _scatter(axes[1, 1], trace.specific_force[:, 1], across, ("f_y", "v r"), rate_hz)
-    rest = np.full(len(trace), -GRAVITY)
-    _compare(axes[2, 0], trace.time, trace.specific_force[:, 2], rest, ("f_z", "at rest"))
-    _lines(axes[2, 1], trace.time, np.degrees(trace.angular_velocity), ("p", "q", "r"), "rates, deg/s")
-    _lines(axes[3, 0], trace.time, imported.raw_force, ("x", "y", "z"), "raw, device axes, m/s²")
-    _spectra(axes[3, 1], imported)
-
-
-def _compare(
-    axes: Axes, time: Floats, found: Floats, expected: Floats | None, names: tuple[str, str]
-) -> None:
-    axes.plot(time, found, linewidth=0.7, label=names[0])
-    if expected is not None:
-        axes.plot(time, expected, label=names[1])
-    axes.set(xlabel="time, s", ylabel="m/s²")
-    axes.legend(ncols=2)
-
-
-def _scatter(axes: Axes, found: Floats, expected: Floats | None, names: Names, rate_hz: float) -> None:
-    if expected is None:
-        axes.text(0.5, 0.5, "no speed in the log", ha="center", va="center")
-        return
-    smooth_found, smooth = (low_pass(values, rate_hz, SMOOTHING_HZ) for values in (found, expected))
-    span = np.array([smooth.min(), smooth.max()])
-    axes.plot(smooth, smooth_found, ".", markersize=1.0)
-    axes.plot(span, span, color="#444444", linewidth=0.8)
-    axes.set(xlabel=f"{names[1]}, m/s²", ylabel=f"{names[0]}, m/s²")
-    note = f"below {SMOOTHING_HZ:g} Hz: correlation {correlation(smooth_found, smooth):.2f}"
-    axes.set_title(note, loc="right", fontweight="normal")
-
-
-def _lines(axes: Axes, time: Floats, values: Floats, names: tuple[str, str, str], label: str) -> None:
-    for name, column in zip(names, values.T, strict=True):
-        axes.plot(time, column, linewidth=0.7, label=name)
-    axes.set(xlabel="time, s", ylabel=label)
-    axes.legend(ncols=3)
-
-
-def _spectra(axes: Axes, imported: ImportedLog) -> None:
-    rate_hz = 1.0 / imported.trace.dt
-    window = min(len(imported.trace), int(_WINDOW_S * rate_hz))
-    for name, values in (("raw", imported.raw_force), ("converted", imported.trace.specific_force)):
-        # The trace of the spectral matrix does not depend on the axes, so raw and converted compare.
-        frequency, density = welch(values - values.mean(axis=0), fs=rate_hz, nperseg=window, axis=0)
-        axes.loglog(frequency[1:], density.sum(axis=1)[1:], label=name)
-    axes.set(xlabel="frequency, Hz", ylabel="force, (m/s²)²/Hz")
-    axes.set_ylim(bottom=1e-8)
-    axes.legend(ncols=2)
-
-
-# ``motion-cueing import``: a log of a drive becomes cues, with a picture of what was found.
-
-
-_MOST_DECIMALS = 15
+_MOST_DECIMALS: Final = 15
 """More digits than a double has are noise."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ImportCommand:
     """Turn a log of a drive into cues.
 
@@ -112,19 +25,19 @@ class ImportCommand:
     forward axis, v r against the lateral one, course against yaw rate), and prints what it found.
     """
 
-    file: Positional[Path]
+    file: Annotated[Path, option("LOG")] = field(kw_only=False)
     """Log to convert: CSV with a header row, or .csv.gz."""
-    column: Annotated[UseAppendAction[list[tuple[str, ...]]], arg(metavar="SIGNAL=COLUMN[:UNIT] ...")]
+    columns: Annotated[tuple[str, ...], several("SIGNAL=COLUMN[:UNIT] ...")]
     """Columns of the signals time [s, ms, us], force_x force_y force_z [m/s2, g], rate_x rate_y rate_z
     [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
     before a column reverses it; a number instead of one is a constant. Speed and course may be missing."""
-    out: Annotated[Path, arg(metavar="FILE")]
+    out: Annotated[Path, option("FILE")]
     """Cues to write, as CSV; packed if the name ends in .gz."""
-    plot: Annotated[Path | None, arg(metavar="FILE.png")] = None
+    plot: Annotated[Path | None, option("FILE.png")] = None
     """Picture (PNG) to write: cues against the car's own motion, raw signals, spectra."""
-    decimals: Annotated[int | None, arg(metavar="N")] = None
+    decimals: Whole | None = None
     """Digits after the point in the cues; nine significant digits if not given."""
-    conversion: OmitArgPrefixes[ImportOptions] = field(default_factory=ImportOptions)
+    conversion: Annotated[ImportOptions, Parameter(name="*")] = field(default_factory=ImportOptions)
     """How the log becomes cues."""
 
 
@@ -141,13 +54,17 @@ def run(command: ImportCommand) -> int:
     check_file("--out", command.out)
     if command.plot is not None:
         _check_plot(command.plot, command)
-    columns, units = parse_columns(chain.from_iterable(command.column))
+    from ..envs.logs.importer import import_log
+
+    columns, units = parse_columns(command.columns)
     name = command.out.name.removesuffix(".gz").removesuffix(".csv")
     imported = import_log(command.file, columns, units=units, options=command.conversion, name=name)
     imported.trace.to_csv(command.out, decimals=command.decimals)
     print("\n".join(imported.findings.lines()))
     print(f"{command.out}: {len(imported.trace)} samples, {imported.trace.duration:.1f} s")
     if command.plot is not None:
+        from .import_figure import import_plot
+
         write_bytes(command.plot, import_plot(imported))
         print(f"{command.plot}: picture")
     return 0

@@ -12,9 +12,9 @@ from rich.markup import escape
 from rich.table import Table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ListCommand:
-    """Show the policies, maneuvers, motion bases and cars that have a name."""
+    """Show every name that a command accepts: policies, maneuvers, motion bases and cars."""
 
 
 def run(command: ListCommand) -> int:

@@ -1,107 +1,24 @@
-"""What tyro says about arguments in plain words: what is wrong with them, and its help."""
+"""The command line ``motion-cueing``: its commands, their help, exit status, and one line for what is wrong.
+
+A command is a dataclass of arguments and a ``run`` in a module of its own. Such a module imports its
+libraries within ``run``, so that help and complaints come at once.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-import io
 import os
-import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import MISSING, dataclass, fields
 from importlib import import_module
-from typing import Any, Final
+from inspect import cleandoc
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from ..envs.errors import ConfigurationError, MotionCueingError, look_up
 
-_ONE: Final = {"FLOAT": "a number", "INT": "a whole number"}
-_MANY: Final = {"FLOAT": "numbers", "INT": "whole numbers"}
-
-
-def plain_complaint(panel: str) -> str:
-    """The sentences of a panel of tyro's, without its frame, the help of the option and internal types.
-
-    Args:
-        panel: What tyro wrote; the frame's first line is its title.
-    """
-    plain = re.sub(r"\x1b\[[0-9;]*m", "", panel)
-    rows = [row.strip("│╭╮╰╯─| ") for row in plain.splitlines()[1:]]
-    # Terminals without box characters get rules of ASCII; a `-` within words belongs to an option.
-    text = " ".join(row for row in rows if row.strip("+-")).split("For full helptext")[0]
-    told, _, suggested = text.partition("Perhaps you meant:")
-    near = dict.fromkeys(re.findall(r"(?<!\S)--[a-z][a-z-]*", suggested))
-    hint = f" Did you mean {' or '.join(near)}?" if near else ""
-    return f"{_reworded(told.strip()).rstrip('.')}.{hint}"
-
-
-def plain_help(text: str) -> str:
-    """Tyro's help without what stands for an option that is not given; its own text says what then happens.
-
-    Everything keeps its place, so that frames stay whole.
-
-    Args:
-        text: What tyro wrote for ``--help``.
-    """
-
-    def blank(found: re.Match[str]) -> str:
-        return re.sub(r"[^\s│|]", " ", found[0])
-
-    def bare(found: re.Match[str]) -> str:
-        return found[1].strip("{}").ljust(len(found[0]))
-
-    # The width of the terminal may break a line within the brackets.
-    text = re.sub(r"\(default:[\s│|]*(?:None)?\)", blank, text)
-    return re.sub(r"\{None\}\|(\{[^}]*\}|[A-Z]+)", bare, text)
-
-
-def _reworded(told: str) -> str:
-    for pattern, sentence in _SENTENCES.items():
-        found = re.match(pattern, told)
-        if found:
-            return sentence(found)
-    return told
-
-
-def _wrong_type(found: re.Match[str]) -> str:
-    """Of an option with several types or values, such as ``{None}|{INT INT}``."""
-    kinds = found["kinds"].replace("{None}|", "").strip("{}").split()
-    return f"{found['option']} takes {_expected(kinds)}, found {found['value'].replace(',', '')}"
-
-
-def _expected(kinds: list[str]) -> str:
-    if len(kinds) == 1:
-        return _ONE.get(kinds[0], kinds[0])
-    alike = len(set(kinds)) == 1 and kinds[0] in _MANY
-    return f"{len(kinds)} {_MANY[kinds[0]]}" if alike else " ".join(kinds)
-
-
-def _missing(found: re.Match[str]) -> str:
-    """Each missing option is told by its name, its values, its help and `(required)`."""
-    names = [part.split()[0] for part in found["options"].split("(required)") if part.strip()]
-    rest = found["rest"].strip()
-    return f"{', '.join(names)} must be given" + (f". {rest}" if rest else "")
-
-
-_SENTENCES: Final[dict[str, Callable[[re.Match[str]], str]]] = {
-    r"Error parsing (--\S+): could not convert string to float: ('.*?')": lambda found: (
-        f"{found[1]} takes a number, found {found[2]}"
-    ),
-    r"Error parsing (--\S+): invalid literal for int\(\) with base 10: ('.*?')": lambda found: (
-        f"{found[1]} takes a whole number, found {found[2]}"
-    ),
-    r"Error parsing (?P<option>--\S+): no type matching (?P<kinds>.*?) could be instantiated from "
-    r"\[(?P<value>.*?)\]": _wrong_type,
-    # What a configuration says of its fields; its class is of no interest here.
-    r"Error parsing [^-]\S*: \w+: (.*)": lambda found: found[1],
-    r"Missing value for argument '(.*?)'\. Expected (\d+) values": lambda found: (
-        f"{found[1]} needs {'a value' if found[2] == '1' else found[2] + ' values'} after it"
-    ),
-    r"Missing from [^:]*: (?P<options>.*\(required\))(?P<rest>.*)": _missing,
-}
-
-# The command ``motion-cueing``: a subcommand is a dataclass of arguments and a ``run`` in its own module.
-
+if TYPE_CHECKING:
+    from cyclopts import App
 
 PROGRAM: Final = "motion-cueing"
 SUCCESS: Final = 0
@@ -109,65 +26,175 @@ FAILURE: Final = 1
 BAD_ARGUMENTS: Final = 2
 INTERRUPTED: Final = 130
 """128 + SIGINT, as shells report it."""
+SHELLS: Final = ("bash", "zsh", "fish")
 
 
 @dataclass(frozen=True)
 class Command:
-    """A subcommand; its module is imported only when it is called.
+    """A command; its module is imported only when it is called.
 
     Args:
         module: Relative to this package.
-        arguments: Name of the dataclass in it that tyro turns into options.
+        arguments: Name of the dataclass in it that becomes its options.
         summary: One line for the overview.
+        example: Arguments that show what it is for.
+        afterwards: What to do next.
         goes_on: Whether the same command goes on where it was stopped.
+        announces: Whether the compilation of kernels is announced while it runs.
     """
 
     module: str
     arguments: str
     summary: str
+    example: str
+    afterwards: str
     goes_on: bool = False
+    announces: bool = True
 
 
 COMMANDS: Final[Mapping[str, Command]] = {
     "evaluate": Command(
-        ".evaluate_command", "EvaluateCommand", "drive maneuvers with policies and compare them"
+        ".evaluate",
+        "EvaluateCommand",
+        "drive maneuvers with policies and compare them",
+        "--policies classical learned --maneuvers hill slalom --out results",
+        "open report.html in --out; `motion-cueing render` shows a drive",
+    ),
+    "benchmark": Command(
+        ".benchmark",
+        "BenchmarkCommand",
+        "evaluate every controller of the benchmark, from no motion to the optimum",
+        "--maneuvers lane-change --out benchmark",
+        "open report.html in --out; ladder.md has the table",
+    ),
+    "paper": Command(
+        ".paper",
+        "PaperCommand",
+        "reproduce the paper's six cases, with a pass or a fail for each number",
+        "--out paper",
+        "open paper.html in --out",
     ),
     "list": Command(
-        ".list_command", "ListCommand", "show the names of policies, maneuvers, motion bases and cars"
+        ".list",
+        "ListCommand",
+        "show the names of policies, maneuvers, motion bases and cars",
+        "",
+        "`motion-cueing evaluate --policies NAME ...` drives with them",
     ),
-    "import": Command(".import_command", "ImportCommand", "turn a log of a drive into cues"),
-    "render": Command(".render_command", "RenderCommand", "draw a drive as a film or a picture"),
-    "export": Command(".export_command", "ExportCommand", "write an agent as an ONNX file"),
-    "train": Command("..cli.train", "TrainCommand", "train an agent on random drives"),
-    "curves": Command(".curves_command", "CurvesCommand", "draw what trainings came to over their steps"),
+    "import": Command(
+        ".import_log",
+        "ImportCommand",
+        "turn a log of a drive into cues",
+        "log.csv --columns time=t:ms force_x=ax:g force_y=ay:g force_z=az:g rate_x=p rate_y=q rate_z=r "
+        "--out cues.csv",
+        "`motion-cueing evaluate --maneuvers cues.csv` drives it",
+    ),
+    "render": Command(
+        ".render",
+        "RenderCommand",
+        "draw a drive as a film or a picture",
+        "--maneuver slalom --policy learned --out slalom.gif",
+        "`motion-cueing evaluate` says how good the drive is",
+    ),
+    "export": Command(
+        ".export",
+        "ExportCommand",
+        "write an agent as an ONNX file",
+        "--policy learned --out learned.onnx",
+        "docs/agents.md says how to run the file",
+    ),
+    "train": Command(
+        ".train",
+        "TrainCommand",
+        "train an agent on random drives",
+        "--algorithm ppo --steps 1e6 --out runs/mine",
+        "`motion-cueing evaluate --policies runs/mine/best.safetensors` compares the agent",
+        goes_on=True,
+    ),
+    "search": Command(
+        ".search",
+        "SearchCommand",
+        "search for an algorithm's best hyperparameters",
+        "--config search.yaml --trials 50 --steps 1e5 --out runs/search",
+        "`motion-cueing train --config runs/search/best.yaml` trains with the best",
+        goes_on=True,
+    ),
+    "population": Command(
+        ".population",
+        "PopulationCommand",
+        "train a population whose worst go on from its best",
+        "--config population.yaml --members 8 --out runs/population",
+        "`motion-cueing evaluate --policies runs/population/best.safetensors` compares the best agent",
+        goes_on=True,
+    ),
+    "curves": Command(
+        ".curves",
+        "CurvesCommand",
+        "draw what trainings came to over their steps",
+        "runs/mine runs/other --out curves.png",
+        "`motion-cueing evaluate` compares the agents on the maneuvers",
+    ),
     "frequency-response": Command(
-        ".frequency_command", "FrequencyResponseCommand", "measure modulus and phase of what is felt"
+        ".frequency_response",
+        "FrequencyResponseCommand",
+        "measure modulus and phase of the simulator's cues",
+        "--policies classical mpc --axes f_x w_y --out frequency-response",
+        "look at bode.png in --out",
     ),
     "compare": Command(
-        ".compare_command",
+        ".compare",
         "CompareCommand",
         "drive on several machines: how much does a controller need?",
+        "--platforms paper 24-inch --policies classical mpc --out comparison",
+        "look at study.png and study.md in --out",
         goes_on=True,
     ),
     "robustness": Command(
-        ".robustness_command",
+        ".robustness",
         "RobustnessCommand",
-        "drive with lag, delay, noise, another car, more fiercely",
+        "drive with lag, delay, noise, another car, and faster",
+        "--policies classical learned --maneuvers slalom --out robustness",
+        "look at study.png and study.md in --out",
         goes_on=True,
     ),
     "endure": Command(
-        ".endure_command",
+        ".endure",
         "EndureCommand",
         "drive for hours, other cars, slower actuators: is a limit exceeded?",
+        "--policies learned-preview --hours 10 --out endurance",
+        "read endurance.md in --out; --seeds drives the worst drives again",
         goes_on=True,
     ),
-    "tune": Command(".tune_command", "TuneCommand", "search for an algorithm's best parameters"),
-    "serve": Command(".serve_command", "ServeCommand", "run a policy as a controller in real time, over UDP"),
-    "drive": Command(".drive_command", "DriveCommand", "send a maneuver's cues to such a controller"),
+    "tune": Command(
+        ".tune",
+        "TuneCommand",
+        "search for a washout's best parameters",
+        "--algorithm classical --hours 100 --workers 2 --out mine.yaml",
+        "`motion-cueing evaluate --policies mine.yaml classical` compares it",
+        goes_on=True,
+    ),
+    "serve": Command(
+        ".serve",
+        "ServeCommand",
+        "run a policy as a controller in real time, over UDP",
+        "--policy classical-tuned --rate 1000",
+        "`motion-cueing drive` in another terminal sends it cues",
+        announces=False,
+    ),
+    "drive": Command(
+        ".drive",
+        "DriveCommand",
+        "send a maneuver's cues to such a controller",
+        "--maneuver slalom --to 127.0.0.1:47100",
+        "`motion-cueing evaluate --replays FILE.npz` scores what `serve --log FILE.npz` wrote",
+        announces=False,
+    ),
     "demonstrate": Command(
-        ".demonstrate_command",
+        ".demonstrate",
         "DemonstrateCommand",
         "record drives of a controller to learn from",
+        "--policy optimum --drives 32 --out demonstrations",
+        "docs/demonstrations.md says how to read the files",
         goes_on=True,
     ),
 }
@@ -193,7 +220,7 @@ def _interrupted(name: str, arguments: Sequence[str]) -> str:
     if name not in COMMANDS or not COMMANDS[name].goes_on:
         return "interrupted"
     fresh = " without --fresh" if "--fresh" in arguments else ""
-    return f"interrupted; drives that are done are kept, and the same command{fresh} goes on"
+    return f"interrupted; what is done is kept, and the same command{fresh} goes on"
 
 
 def _guarded(program: str, work: Callable[[], int], interrupted: str) -> int:
@@ -221,20 +248,34 @@ def _dispatch(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
         print(overview())
         return SUCCESS if arguments else BAD_ARGUMENTS
-    if arguments[0] == "--version":
-        from ..envs.provenance import package_version
-
-        print(f"{PROGRAM} {package_version()}")
-        return SUCCESS
     name, rest = arguments[0], arguments[1:]
+    if name == "--version":
+        from importlib.metadata import version
+
+        print(f"{PROGRAM} {version('motion-cueing-gym')}")
+        return SUCCESS
+    if name == "--print-completion":
+        shell = look_up("shell", rest[0] if rest else "", {shell: shell for shell in SHELLS})
+        print(_whole().generate_completion(prog_name=PROGRAM, shell=shell))  # type: ignore[arg-type]
+        return SUCCESS
+    if name == "__complete":
+        # The script of --print-completion asks for names.
+        _whole()(arguments, result_action="return_none")
+        return SUCCESS
+    if name.startswith("-"):
+        raise ConfigurationError(f"a command comes first, found {name}. See `{PROGRAM} --help`")
     command = look_up("command", name, COMMANDS)
-    module = import_module(command.module, __package__)
-    parsed = _parse(name, getattr(module, command.arguments), rest)
-    return parsed if isinstance(parsed, int) else int(module.run(parsed))
+    parsed = parse(name, rest)
+    if parsed is None:
+        return SUCCESS
+    from ..envs.progress import compilation_announced
+
+    with compilation_announced() if command.announces else nullcontext():
+        return int(import_module(command.module, __package__).run(parsed))
 
 
 def overview() -> str:
-    """The help of the command without a subcommand."""
+    """The help of the program without a command."""
     width = max(map(len, COMMANDS))
     lines = [f"  {name:<{width}}  {command.summary}" for name, command in COMMANDS.items()]
     return "\n".join(
@@ -246,48 +287,96 @@ def overview() -> str:
             "commands:",
             *lines,
             "",
-            f"`{PROGRAM} COMMAND --help` shows the options of a command, `{PROGRAM} --version` the version.",
+            "example:",
+            f"  {PROGRAM} evaluate --policies classical classical-tuned --maneuvers lane-change",
+            "",
+            f"`{PROGRAM} COMMAND --help` shows the options of a command and an example.",
+            f"`{PROGRAM} --version` shows the version.",
+            f"`{PROGRAM} --print-completion {'|'.join(SHELLS)}` writes a script by which a shell",
+            f'completes options: eval "$({PROGRAM} --print-completion bash)" in ~/.bashrc.',
         ]
     )
 
 
-def _parse(name: str, arguments: type[Any], rest: list[str]) -> Any:
-    """The dataclass filled from the arguments, or the exit status after ``--help``."""
-    import tyro
+def parse(name: str, arguments: Sequence[str]) -> Any:
+    """The arguments of a command.
 
-    _refuse_repeated(arguments, rest)
-    _refuse_nothing(arguments, rest)
-    complaint, shown = io.StringIO(), io.StringIO()
+    Args:
+        name: Of the command.
+        arguments: Words after it.
+
+    Returns:
+        Its dataclass; None where its help was asked for and has been shown.
+
+    Raises:
+        ConfigurationError: an argument is wrong.
+    """
+    from cyclopts import CycloptsError
+
+    from .errors import complaint
+
+    app = app_of(name)
+    if any(word in ("-h", "--help") for word in arguments):
+        app.help_print([])
+        # Not folded as the rest of the help is, so that it can be copied.
+        example = f"{PROGRAM} {name} {COMMANDS[name].example}".rstrip()
+        print(f"\nExample:\n  {example}\n\nNext: {COMMANDS[name].afterwards}.")
+        return None
     try:
-        with redirect_stderr(complaint), redirect_stdout(shown):
-            return tyro.cli(arguments, prog=f"{PROGRAM} {name}", args=rest)
-    except SystemExit as stop:
-        if not stop.code:
-            print(plain_help(shown.getvalue()), end="")
-            return SUCCESS
-        told = plain_complaint(complaint.getvalue())
-        raise ConfigurationError(f"{told} See `{PROGRAM} {name} --help`") from None
+        _, bound, _ = app.parse_args(list(arguments), exit_on_error=False, print_error=False)
+    except CycloptsError as error:
+        # What a configuration says of its fields is a sentence already.
+        cause = error.__cause__
+        raise (cause if isinstance(cause, MotionCueingError) else complaint(name, error)) from None
+    return bound.arguments["command"] if bound.arguments else _class_of(name)()
 
 
-def _refuse_repeated(arguments: type[Any], rest: list[str]) -> None:
-    """Tyro keeps only the last of repeated lists: say so instead of dropping names."""
-    for option in dataclasses.fields(arguments):
-        flag = "--" + option.name.replace("_", "-")
-        times = sum(word == flag or word.startswith(flag + "=") for word in rest)
-        if times > 1 and "Append" not in str(option.type):
-            raise ConfigurationError(
-                f"{flag} is given {times} times; give it once, with all its values after it"
-            )
+def _class_of(name: str) -> type[Any]:
+    command = COMMANDS[name]
+    return getattr(import_module(command.module, __package__), command.arguments)  # type: ignore[no-any-return]
 
 
-def _refuse_nothing(arguments: type[Any], rest: list[str]) -> None:
-    """Tyro takes an option without its names for an empty list, which may be the default."""
-    if "--help" in rest:
-        return
-    for option in dataclasses.fields(arguments):
-        flag = "--" + option.name.replace("_", "-")
-        if not isinstance(option.default, tuple) or flag not in rest:
-            continue
-        after = rest[rest.index(flag) + 1 :]
-        if not after or after[0].startswith("--"):
-            raise ConfigurationError(f"{flag} needs at least one name or file after it")
+def app_of(name: str, prefix: str = f"{PROGRAM} ") -> App:
+    """The parser of a command.
+
+    Args:
+        name: Of the command.
+        prefix: Of its name in the help.
+    """
+    from cyclopts import App, Parameter
+
+    kind = _class_of(name)
+    app = App(
+        name=f"{prefix}{name}",
+        help=cleandoc(kind.__doc__ or ""),
+        help_format="markdown",
+        version_flags=(),
+        default_parameter=Parameter(negative=(), show_default=_shown),
+    )
+    app["--help"].show = False
+
+    def run(command: Any) -> None:
+        """Only its arguments count."""
+
+    run.__annotations__ = {"command": Annotated[kind, Parameter(name="*")]}
+    if not any(field.default is MISSING and field.default_factory is MISSING for field in fields(kind)):
+        run.__defaults__ = (kind(),)
+    app.default(run)
+    return app
+
+
+def _shown(value: Any) -> str | None:
+    """A default in the help; None where it says nothing."""
+    if value is None or value is False or value in ((), ""):
+        return None
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+def _whole() -> App:
+    """All commands in one parser, as completion needs it."""
+    from cyclopts import App
+
+    whole = App(name=PROGRAM, version_flags=("--version",))
+    for name in COMMANDS:
+        whole.command(app_of(name, prefix=""))
+    return whole

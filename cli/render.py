@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final
-
-from rich.console import Console
-from rich.progress import track
-from tyro.conf import arg
+from typing import TYPE_CHECKING, Annotated, Final
 
 from ..envs.errors import ConfigurationError
-from ..envs.rendering import FRAMES_PER_SECOND, Renderer
+from ..envs.progress import progress
 from ..envs.storage import check_file
-from ..evaluation.reporting.film import Picture, check_suffix, film_frames, frame_rows, gif_rate, save_film
-from ..evaluation.selection import find_car, find_maneuvers, find_platform, find_policies
-from ..evaluation.trajectory import Trajectory
+from . import arguments
+from .arguments import CarName, ManeuverName, PlatformName, PolicyName, option
+
+if TYPE_CHECKING:
+    from ..envs.rendering import Renderer
+    from ..evaluation.reporting.film import Picture
+    from ..evaluation.trajectory import Trajectory
 
 _FILM_SIZE: Final = (1280, 720)
 _GIF_SIZE: Final = (800, 450)
@@ -25,28 +24,21 @@ _GIF_RATE: Final = 12.5
 """GIFs are for pages, where a few MiB are much."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RenderCommand:
-    """Draw a drive: the machine moving, beside the cues wanted and felt.
+    """Draw a drive: the moving machine beside the reference cues and the simulator's cues."""
 
-    `motion-cueing list` shows all names.
-    """
-
-    out: Annotated[Path, arg(metavar="FILE.gif|.mp4|.png")]
+    out: Annotated[Path, option("FILE.gif|.mp4|.png")]
     """File to write; a png shows one moment."""
-    maneuver: Annotated[str, arg(metavar="NAME|FILE")] = "double-lane-change"
-    """Maneuver or recording, by name or cue CSV file."""
-    policy: Annotated[str, arg(metavar="NAME|FILE")] = "classical"
-    """Policy, by name or file."""
-    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
-    """Motion base, by name or YAML file."""
-    car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
-    """Car, by name or YAML file."""
+    maneuver: ManeuverName = "double-lane-change"
+    policy: PolicyName = "classical"
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
     begin: float | None = None
     """Time of the first frame, s; of a png the moment shown, default: the middle of the drive."""
     end: float | None = None
     """Time of the last frame, s; default: the end of the drive."""
-    size: tuple[int, int] | None = None
+    size: Annotated[tuple[int, int] | None, option("WIDTH HEIGHT")] = None
     """Width and height, pixels; default 1280 720, of a gif 800 450."""
     rate: float | None = None
     """Frames a second; default 30, of a gif 12.5, whose frames last whole hundredths of a second."""
@@ -58,13 +50,16 @@ def run(command: RenderCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong, or a package that draws is missing.
     """
+    from ..envs.rendering import FRAMES_PER_SECOND, Renderer
+    from ..evaluation.reporting.film import check_suffix, film_frames, gif_rate, save_film
+
     suffix = check_suffix(command.out)
     if suffix == ".png" and (command.end is not None or command.rate is not None):
         raise ConfigurationError("a png shows one moment, --begin; leave --end and --rate out")
     check_file("--out", command.out)
     size = command.size or (_GIF_SIZE if suffix == ".gif" else _FILM_SIZE)
     # Made before anything is driven, so that a wrong size or a missing package is told at once.
-    renderer = Renderer(find_platform(command.platform), size)
+    renderer = Renderer(arguments.find_platform(command.platform), size)
     trajectory = drive(command)
     if suffix == ".png":
         moment = 0.5 * float(trajectory.time[-1]) if command.begin is None else command.begin
@@ -78,16 +73,12 @@ def run(command: RenderCommand) -> int:
 
 def drive(command: RenderCommand) -> Trajectory:
     """The drive a command asks for."""
-    from ..evaluation.policies import make_policy
     from ..evaluation.rollout import rollout
 
-    platform, car = find_platform(command.platform), find_car(command.car)
-    sources = find_maneuvers((command.maneuver,), car)
-    if len(sources) != 1:
-        raise ConfigurationError(f"--maneuver {command.maneuver} means several drives; name one")
-    ((label, source),) = sources.items()
-    ((name, policy),) = find_policies((command.policy,), platform).items()
-    trajectory = rollout(make_policy(policy, platform), source(), platform=platform, car=car)
+    platform, car = arguments.find_platform(command.platform), arguments.find_car(command.car)
+    label, source = arguments.find_maneuver(command.maneuver, car)
+    ((name, policy),) = arguments.find_policies((command.policy,), platform).items()
+    trajectory = rollout(arguments.make_policy(policy, platform), source(), platform=platform, car=car)
     return replace(trajectory, maneuver=label, policy=name)
 
 
@@ -95,8 +86,11 @@ def _watched(
     command: RenderCommand, trajectory: Trajectory, renderer: Renderer, rate: float
 ) -> Iterator[Picture]:
     """The frames, with a bar on the terminal's error stream."""
+    from ..evaluation.reporting.film import film_frames, frame_rows
+
     begin = command.begin or 0.0
     total = len(frame_rows(trajectory, rate, begin, command.end))
-    frames = film_frames(trajectory, renderer, rate, begin, command.end)
-    console = Console(stderr=True, quiet=not sys.stderr.isatty())
-    yield from track(frames, "drawing", total=total, console=console, transient=True)
+    with progress(total, "frames", "drawing") as bar:
+        for frame in film_frames(trajectory, renderer, rate, begin, command.end):
+            yield frame
+            bar.move(advance=1)

@@ -6,40 +6,42 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from tyro.conf import FlagCreatePairsOff, arg
-
-from ..evaluation.benchmark import BENCHMARK, benchmark_policies
-from ..evaluation.reporting.text import words_of
-from ..evaluation.selection import find_car, find_maneuvers, find_platform, find_policies
-from .studies import prepare, run_and_save
+from .arguments import (
+    BENCHMARK,
+    CarName,
+    Fresh,
+    ManeuverNames,
+    Name,
+    OutFolder,
+    PlatformName,
+    PolicyNames,
+    find_car,
+    find_maneuvers,
+    find_platform,
+    find_policies,
+)
 
 if TYPE_CHECKING:
     from ..envs.car import Car
     from ..evaluation.studies.disturbances import Study
     from ..evaluation.suite import CueSource
 
-Name = Annotated[str, arg(metavar="NAME|FILE")]
-Names = Annotated[tuple[str, ...], arg(metavar="NAME|FILE ...")]
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobustnessCommand:
-    """Drive policies with slower actuators, dead time, noisy sensors, another car, and in fiercer drives.
+    """Drive policies with slower actuators, dead time, noisy sensors, another car, and in faster drives.
 
-    Each policy is made for the machine as it should be and knows nothing of the disturbance. Drives that are
-    done are kept in the output folder and not driven again.
+    Each policy is made for the machine as it should be and knows nothing of the disturbance. Policies of the
+    benchmark that know the drive beforehand are left out. Without --maneuvers the standard maneuvers are
+    driven. Drives that are done are kept in the output folder and not driven again.
     """
 
-    policies: Names = (BENCHMARK,)
-    """Policies, by name or file; `benchmark` for every controller that is not told the drive beforehand."""
-    maneuvers: Names = ()
-    """Maneuvers and recordings, by name or cue CSV file; default: the standard maneuvers."""
-    platform: Name = "paper"
-    """Motion base, by name or YAML file."""
-    car: Name = "sedan"
-    """Car, by name or YAML file."""
+    policies: PolicyNames = (BENCHMARK,)
+    maneuvers: ManeuverNames = ()
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
     other_car: Name = "e-class-suv"
     """The other car, by name or YAML file."""
     lag: float = 30.0
@@ -52,10 +54,8 @@ class RobustnessCommand:
     """Standard deviation of the noise on angular velocities, deg/s."""
     time_scaling: float = 2.0
     """Factor on all accelerations of the drives."""
-    out: Annotated[Path, arg(metavar="DIR")] = Path("robustness")
-    """Folder for everything that is written; made if missing."""
-    fresh: Annotated[bool, FlagCreatePairsOff] = False
-    """Drive everything again."""
+    out: OutFolder = Path("robustness")
+    fresh: Fresh = False
 
 
 def run(command: RobustnessCommand) -> int:
@@ -64,7 +64,9 @@ def run(command: RobustnessCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
+    from ..evaluation.reporting.text import words_of
     from ..evaluation.studies.figures import heat_figure
+    from .studies import prepare, run_and_save
 
     study = make_study(command)
     policies = find_policies(command.policies, study.platform)
@@ -87,6 +89,7 @@ def make_study(command: RobustnessCommand) -> Study:
         MotionCueingError: an argument is wrong.
     """
     from ..envs.maneuvers import maneuver_names
+    from ..evaluation.benchmark import ladder_names
     from ..evaluation.policies import policy_names
     from ..evaluation.studies.disturbances import Disturbances, SensorNoise, Study
 
@@ -95,13 +98,13 @@ def make_study(command: RobustnessCommand) -> Study:
     def maneuvers(driven: Car) -> Mapping[str, CueSource]:
         return find_maneuvers(names, driven)
 
-    compared = benchmark_policies(policy_names()) if BENCHMARK in command.policies else []
+    rows = ladder_names(policy_names()) if BENCHMARK in command.policies else []
     return Study(
         platform=find_platform(command.platform),
         car=find_car(command.car),
         other=find_car(command.other_car),
         maneuvers=maneuvers,
-        causal=frozenset(compared) - set(command.policies),
+        causal=frozenset(rows) - set(command.policies),
         disturbances=Disturbances(
             lag=command.lag,
             dead_time=command.dead_time,

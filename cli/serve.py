@@ -9,76 +9,67 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
-
-from tyro.conf import arg
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from ..envs.errors import ConfigurationError
-from ..envs.platform import Platform
+from ..envs.progress import compilation_announced
 from ..envs.storage import check_file
-from ..evaluation.reporting.text import words_of
-from ..evaluation.selection import find_platform
-from ..realtime.controller import Controller, ControllerOptions
-from ..realtime.inbox import CueBounds, Inbox
-from ..realtime.machine import LiveMachine, make_machine
-from ..realtime.packets import make_format
-from ..realtime.report import LoopReport, report_of, show
-from ..realtime.server import Endpoint, Server, address_of, is_loopback
-from ..realtime.timing import undisturbed
-from ..realtime.watchdog import State, WatchdogOptions
-from ..train.training import Interrupt
+from . import arguments
+from .arguments import PlatformName, PolicyName, Whole, option
+
+if TYPE_CHECKING:
+    from ..envs.platform import Platform
+    from ..realtime.controller import Controller
+    from ..realtime.machine import LiveMachine
+    from ..realtime.report import LoopReport
+    from ..realtime.server import Endpoint, Server
 
 DEFAULT_PORT: Final = 47100
 _VESTIBULAR: Final = "zacharias"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ServeCommand:
     """Run a policy as a controller in real time: cues come over UDP, set-points go out.
 
     Listens on this machine alone unless --host says otherwise. Ctrl-C brakes to neutral, writes the log and
-    the report, and ends. docs/loop.md describes the packets.
+    the report, and ends. A policy that must know the whole drive beforehand cannot be served. docs/loop.md
+    describes the packets.
     """
 
-    policy: Annotated[str, arg(metavar="NAME|FILE")] = "classical-tuned"
-    """Policy, by name or file; one that must know the whole drive cannot be served."""
-    rate: int = 1000
+    policy: PolicyName = "classical-tuned"
+    rate: Whole = 1000
     """Set-points a second, a multiple of 100; the policy acts 100 times a second."""
-    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
-    """Motion base, by name or YAML file."""
+    platform: PlatformName = "paper"
     host: str = "127.0.0.1"
     """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
-    port: int = DEFAULT_PORT
+    port: Whole = DEFAULT_PORT
     """Port to listen at; 0 for any that is free."""
-    peer: Annotated[str, arg(metavar="HOST[:PORT]")] = ""
+    peer: Annotated[str, option("HOST[:PORT]")] = ""
     """Listen to this sender alone; default: to the first, until it falls silent."""
     format: Literal["floats", "msgpack"] = "floats"
     """How packets are written."""
     duration: float | None = None
     """Time after which it brakes and ends, s; default: until Ctrl-C."""
-    overdue: float = WatchdogOptions().overdue
+    overdue: float = 0.03
     """Age of the newest cues from which they are held, s."""
-    hold: float = WatchdogOptions().hold
+    hold: float = 0.2
     """Age from which the machine brakes and goes to neutral, s."""
-    stale: float = WatchdogOptions().stale
+    stale: float = 0.05
     """Delay on the way, beyond the least seen, from which a packet is too old, s."""
-    steady: float = WatchdogOptions().steady
+    steady: float = 0.2
     """How long cues must have come without a gap before the policy begins, s."""
-    fade: float = WatchdogOptions().fade
+    fade: float = 1.0
     """Time in which the cues come in then, s."""
-    max_force: float = 1000.0
-    """Largest plausible specific force on an axis, m/s^2; packets beyond it are not used."""
-    max_angular_velocity: float = 100.0
-    """Largest plausible angular velocity about an axis, rad/s."""
     lead: float = 0.001
     """Time before its first set-point at which a step of 10 ms is decided, s; at most a period."""
-    cpu: int | None = None
+    cpu: Whole | None = None
     """Core to run on alone."""
-    priority: int | None = None
+    priority: Whole | None = None
     """Real-time priority (SCHED_FIFO), 1 to 99; needs the right to it."""
-    log: Annotated[Path | None, arg(metavar="FILE.npz")] = None
-    """Trajectory to write, for `motion-cueing evaluate --replay`."""
-    report: Annotated[Path | None, arg(metavar="FILE.json")] = None
+    log: Annotated[Path | None, option("FILE.npz")] = None
+    """Trajectory to write, for `motion-cueing evaluate --replays`."""
+    report: Annotated[Path | None, option("FILE.json")] = None
     """Counts and timings to write."""
 
 
@@ -99,7 +90,14 @@ def run(command: ServeCommand) -> int:
         MotionCueingError: an argument is wrong.
     """
     _check(command)
-    served = _made(command)
+    print(
+        f"making {command.policy} for {command.platform}; it takes some seconds", file=sys.stderr, flush=True
+    )
+    from ..realtime.packets import make_format
+    from ..realtime.server import Endpoint, Server, address_of
+
+    with compilation_announced():
+        served = _made(command)
     endpoint = Endpoint(address_of(command.host, command.port))
     try:
         server = Server(served.controller, endpoint, make_format(command.format), command.rate, command.lead)
@@ -117,26 +115,32 @@ def _check(command: ServeCommand) -> None:
         raise ConfigurationError(f"--lead must not be negative, found {command.lead:g}")
     if command.log is not None and command.log.suffix != ".npz":
         raise ConfigurationError(f"--log {command.log}: a trajectory's file ends in .npz")
-    for option, file in (("--log", command.log), ("--report", command.report)):
+    for flag, file in (("--log", command.log), ("--report", command.report)):
         if file is not None:
-            check_file(option, file)
+            check_file(flag, file)
 
 
 def _made(command: ServeCommand) -> _Served:
-    from ..evaluation.policies import make_policy
+    from ..realtime.controller import Controller, ControllerOptions
+    from ..realtime.inbox import Inbox
+    from ..realtime.machine import make_machine
+    from ..realtime.packets import make_format
+    from ..realtime.server import address_of
+    from ..realtime.watchdog import Patience
 
-    watchdog = WatchdogOptions(command.overdue, command.hold, command.stale, command.steady, command.fade)
-    options = ControllerOptions(rate=command.rate, watchdog=watchdog)
+    patience = Patience(command.overdue, command.hold, command.stale, command.steady, command.fade)
+    options = ControllerOptions(rate=command.rate, patience=patience)
     peer = address_of(command.peer, 0) if command.peer else None
-    bounds = CueBounds(command.max_force, command.max_angular_velocity)
-    inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)
-    platform = find_platform(command.platform)
-    policy = make_policy(command.policy, platform)
+    inbox = Inbox(make_format(command.format), patience.stale, patience.overdue, peer)
+    platform = arguments.find_platform(command.platform)
+    policy = arguments.make_policy(command.policy, platform)
     machine = make_machine(policy, platform, _VESTIBULAR)
     return _Served(policy, platform, machine, Controller(machine, platform, inbox, options))
 
 
 def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
+    from ..realtime.server import is_loopback
+
     host, port = endpoint.address
     print(f"{command.policy} on {command.platform}: UDP {host}:{port}, {command.rate} set-points a second")
     if not is_loopback(endpoint.address):
@@ -159,6 +163,9 @@ def _terminated_gently() -> Iterator[None]:
 
 
 def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
+    from ..realtime.timing import undisturbed
+    from ..train.training import Interrupt
+
     interrupt, limit = Interrupt(), command.duration
     with interrupt.caught(), _terminated_gently(), undisturbed(command.cpu, command.priority):
         # Whoever reads it may stop the controller at once.
@@ -171,8 +178,10 @@ def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
 
 def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: Endpoint) -> None:
     """Write the log and the report, and say what happened."""
+    from ..realtime.report import tell
+
     report = _report(command, served.controller, server, endpoint)
-    show(report, "steps of 10 ms", command.report)
+    tell(report, "steps of 10 ms", command.report)
     log = served.controller.log
     if command.log is not None and len(log) < 2:
         print(f"--log {command.log} is not written: it ended within the first steps", file=sys.stderr)
@@ -181,6 +190,10 @@ def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: En
 
 
 def _report(command: ServeCommand, controller: Controller, server: Server, endpoint: Endpoint) -> LoopReport:
+    from ..evaluation.reporting.text import words_of
+    from ..realtime.report import report_of
+    from ..realtime.watchdog import State
+
     inbox, states = controller.inbox, controller.log.states
     return report_of(
         words_of("serve", command),

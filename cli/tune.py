@@ -1,134 +1,83 @@
-"""What a person sees of a search: a bar on a terminal, now and then a line elsewhere."""
+"""``motion-cueing tune``: search for a washout's best parameters."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-import yaml
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from tyro.conf import FlagCreatePairsOff, Positional, arg
-
-from ..baselines.tuning.search import Status
-from ..baselines.washout.families import FAMILIES, AnyWashout, algorithm_of, load_of
-from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, DataError
-from ..envs.provenance import command_line, commit, hardware, now, versions
-from ..envs.settings import to_dict
+from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.progress import Bars
 from ..envs.storage import check_file, write_text
-from ..evaluation.selection import find_car, find_maneuvers, find_platform
-from ..train.training import Interrupt
+from .arguments import (
+    CarName,
+    Fresh,
+    Names,
+    PlatformName,
+    Whole,
+    Workers,
+    find_car,
+    find_maneuvers,
+    find_platform,
+    option,
+)
 
 if TYPE_CHECKING:
     from ..baselines.tuning.objective import Objective
-    from ..baselines.tuning.search import Record, Search, TuningOptions
+    from ..baselines.tuning.search import Record, Search, Status, TuningOptions
+    from ..baselines.washout.families import AnyWashout
     from ..envs.car import Car
+    from ..envs.cues import CueTrace
 
 _LINES: Final = 20
 """Lines in all where the output is no terminal."""
-
-
-class TuningProgress:
-    """A bar with hours simulated, the best so far and the time left.
-
-    Args:
-        budget: Hours to simulate.
-        console: Where to write; default: the error stream.
-    """
-
-    def __init__(self, budget: float, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True)
-        self._budget, self._told = budget, -1
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.completed:.0f}/{task.total:.0f} h"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=self._console,
-            disable=not self._console.is_terminal,
-            transient=True,
-        )
-        self._task = self._bar.add_task("tuning", total=budget)
-
-    def __enter__(self) -> TuningProgress:
-        """Show the bar."""
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Remove it."""
-        self._bar.stop()
-
-    def tell(self, status: Status) -> None:
-        """Move the bar; without a terminal, write a line when another part of the budget is spent."""
-        best = "tuning" if status.best is None else f"best {status.best:.4f}"
-        self._bar.update(self._task, completed=min(status.hours, self._budget), description=best)
-        part = int(_LINES * status.hours / self._budget)
-        if not self._console.is_terminal and status.best is not None and part > self._told:
-            self._told = part
-            line = f"{status.hours:8.0f} h  {best}  ({status.steps} steps)"
-            self._console.print(line, highlight=False, soft_wrap=True)
-
-
-# ``motion-cueing tune``: search for an algorithm's best parameters.
-
-
 _SUCCESS: Final = 0
 _INTERRUPTED: Final = 130
 _MADE_BY: Final = "Made by: "
 """What a file of this command begins with."""
 _TRACK: Final = "random track drive"
 """Source of a random drive on a handling track."""
+_HELD: Final = ("objective", "method", "limits", "maneuvers", "drives", "seed")
+"""Options that a search keeps to its end."""
+_ELSE: Final = "leave it out, name another --out, or add --fresh to begin anew"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TuneCommand:
-    """Search for the parameters with which an algorithm is at its best on random drives or named maneuvers.
+    """Search for the parameters with which a washout is at its best on random drives or named maneuvers.
 
-    Writes a policy for `motion-cueing evaluate
-    --policy FILE`. Ctrl-C stops after the generation at hand; --resume goes on.
+    Writes a policy for `motion-cueing evaluate --policies FILE`. Ctrl-C stops after the generation at hand;
+    the same command goes on from the search kept beside --out, and another --hours makes it longer.
     """
 
-    algorithm: Positional[Annotated[str, arg(metavar="|".join(FAMILIES))]]
+    algorithm: Annotated[str, option("classical|adaptive|optimal")]
     """What to tune."""
     objective: Literal["J", "perceived"] = "J"
-    """What to minimize: J, or J of what the driver senses."""
+    """What to minimize: J, or J of the perceived cues."""
     method: Literal["cma", "gradient"] = "cma"
     """Search with CMA-ES, or, classical only, along the gradient of J through the machine's equations."""
-    maneuvers: Annotated[tuple[str, ...], arg(metavar="train|NAME|FILE ...")] = ("train",)
-    """Random drives, or maneuvers and recordings by name or cue CSV file."""
+    maneuvers: Names = ("train",)
+    """Maneuvers and recordings, by name or cue CSV file; `train` for random drives."""
     limits: Literal["roads", "all"] = "roads"
     """Where no limit of the machine may be met: on roads, or also in random drives on a track."""
-    drives: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 256)")] = None
-    """Random drives, each of a minute."""
-    budget: Annotated[float | None, arg(metavar="HOURS", help_behavior_hint="(default: 1000)")] = None
-    """Hours to simulate; generations up to the next trial on all drives, five at most, follow."""
-    seed: Annotated[int | None, arg(metavar="S", help_behavior_hint="(default: 0)")] = None
-    """Of everything that the search draws."""
-    start: Annotated[
-        str | None, arg(metavar="NAME|FILE", help_behavior_hint="(default: the set that is set by hand)")
-    ] = None
-    """Set to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it."""
-    platform: Annotated[str, arg(metavar="NAME|FILE")] = "paper"
-    """Motion base, by name or YAML file."""
-    car: Annotated[str, arg(metavar="NAME|FILE")] = "sedan"
-    """Car that drives named maneuvers, by name or YAML file."""
-    threads: int = 1
-    """Cores to use."""
-    out: Annotated[
-        Path | None, arg(metavar="FILE.yaml", help_behavior_hint="(default: my-classical.yaml and so on)")
-    ] = None
-    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json."""
-    resume: Annotated[bool, FlagCreatePairsOff] = False
-    """Go on with the search kept beside --out; --budget may extend it."""
+    drives: Whole | None = None
+    """Random drives, each of a minute; default: 256."""
+    hours: float | None = None
+    """Hours to simulate; generations up to the next trial on all drives, five at most, follow; default:
+    1000."""
+    seed: Whole | None = None
+    """Of everything that the search draws; default: 0."""
+    start: Annotated[str | None, option("NAME|FILE")] = None
+    """Set to begin with, by name or YAML file; orders of filters and blocks that are off stay as in it;
+    default: the set that is set by hand."""
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
+    workers: Workers = 1
+    out: Annotated[Path | None, option("FILE.yaml")] = None
+    """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json;
+    default: my-classical.yaml and so on."""
+    fresh: Fresh = False
 
 
 def run(command: TuneCommand) -> int:
@@ -137,18 +86,23 @@ def run(command: TuneCommand) -> int:
     Raises:
         MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
     """
-    FAMILIES[command.algorithm]  # refuses unknown ones
+    from ..baselines.washout.families import ALGORITHMS
+    from ..train.training import Interrupt
+
+    look_up("algorithm", command.algorithm, ALGORITHMS)
     command = replace(command, out=_out(command))
     _check(command)
-    record = _record(command)
-    search = _search(command, record)
+    goes_on = _kept(command).exists() and not command.fresh
+    record = _begun(command) if goes_on else _new(command)
+    search = _search(record, command, goes_on)
     interrupt = Interrupt()
-    with interrupt.caught(), TuningProgress(search.options.budget) as progress:
-        stopped = search.run(progress.tell, lambda: interrupt.asked)
-    _write(command, search)
+    with interrupt.caught(), Bars() as bars:
+        tell = Telling(bars, search.options.budget)
+        stopped = search.run(tell, lambda: interrupt.asked)
+    _write(command, search, goes_on)
     status = search.status
     if stopped:
-        on = f"motion-cueing tune {command.algorithm} --out {_out(command)} --resume"
+        on = f"motion-cueing tune --algorithm {command.algorithm} --out {_out(command)}"
         print(f"stopped after {status.hours:.3g} h; go on with: {on}", file=sys.stderr)
         return _INTERRUPTED
     if status.hours < search.options.budget:
@@ -156,23 +110,44 @@ def run(command: TuneCommand) -> int:
     return _SUCCESS
 
 
+class Telling:
+    """Shows a search: a bar of the hours simulated, and lines where there is no terminal.
+
+    Args:
+        bars: Where.
+        budget: Hours in all.
+    """
+
+    def __init__(self, bars: Bars, budget: float) -> None:
+        self._bars, self._budget, self._shown = bars, budget, -1
+        self._bar = bars.add("tuning", budget, "h")
+
+    def __call__(self, status: Status) -> None:
+        """Move the bar; without a terminal, write a line when another part of the budget is spent."""
+        best = "tuning" if status.best is None else f"best {status.best:.4f}"
+        self._bar.move(min(status.hours, self._budget), best)
+        part = int(_LINES * status.hours / self._budget)
+        if not self._bars.console.is_terminal and status.best is not None and part > self._shown:
+            self._shown = part
+            self._bars.line(f"{status.hours:8.0f} h  {best}  ({status.steps} steps)")
+
+
 def _out(command: TuneCommand) -> Path:
-    return command.out or Path(f"my-{FAMILIES[command.algorithm].start}.yaml")
+    from ..baselines.washout.families import ALGORITHMS
+
+    return command.out or Path(f"my-{ALGORITHMS[command.algorithm].start}.yaml")
 
 
 def _check(command: TuneCommand) -> None:
     if _out(command).suffix not in (".yaml", ".yml"):
         raise ConfigurationError(f"--out {command.out}: a policy's file ends in .yaml")
-    if command.threads < 1:
-        raise ConfigurationError(f"--threads must be at least 1, found {command.threads}")
+    if command.workers < 1:
+        raise ConfigurationError(f"--workers must be at least 1, found {command.workers}")
+    if command.hours is not None and not command.hours > 0.0:
+        raise ConfigurationError(f"--hours must be positive, found {command.hours:g}")
     if command.drives is not None and "train" not in command.maneuvers:
         raise ConfigurationError("--drives counts random drives; leave it out, or add `train` to --maneuvers")
     _check_out(_out(command))
-    kept = _kept(command)
-    if not command.resume and kept.exists():
-        raise ConfigurationError(f"{kept} holds a search; go on with --resume, or name another --out")
-    if command.resume:
-        _check_resumed(command)
 
 
 def _check_out(out: Path) -> None:
@@ -182,44 +157,51 @@ def _check_out(out: Path) -> None:
         raise DataError(f"{out} was not written by this command; move it away, or name another --out")
 
 
-def _check_resumed(command: TuneCommand) -> None:
-    """A search that is taken up keeps its options."""
-    fresh = TuneCommand(command.algorithm)
-    for name in ("objective", "method", "limits", "maneuvers", "drives", "seed", "start", "platform", "car"):
-        if getattr(command, name) != getattr(fresh, name):
-            raise ConfigurationError(f"--{name} was chosen when the search was begun; leave it out")
-
-
-def _check_algorithm(command: TuneCommand, record: Record) -> None:
-    begun = algorithm_of(record.options.start)
-    if begun != command.algorithm:
-        raise ConfigurationError(
-            f"{_kept(command)} is a search of {begun}; go on with: motion-cueing tune {begun}"
-        )
-
-
 def _kept(command: TuneCommand) -> Path:
     return _out(command).with_suffix(".search.json")
 
 
-def _record(command: TuneCommand) -> Record:
-    """The record of an earlier session, or an empty one of a new search."""
-    from ..baselines.tuning.search import Record, load_record
+def _new(command: TuneCommand) -> Record:
+    """The empty record of a new search."""
+    from ..baselines.tuning.search import Record
+    from ..train.provenance import command_line
 
-    if command.resume:
-        record = load_record(_kept(command))
-        _check_algorithm(command, record)
-        budget = command.budget or record.options.budget
-        return replace(record, options=replace(record.options, budget=budget))
     return Record(_options(command), command.platform, command.car, "", command=command_line())
+
+
+def _begun(command: TuneCommand) -> Record:
+    """The record of an earlier session, with as many hours as are asked for.
+
+    Raises:
+        ConfigurationError: an option is given that differs from the search's.
+    """
+    from ..baselines.tuning.search import load_record
+    from ..baselines.washout.families import algorithm_of, load_of
+
+    record, default = load_record(_kept(command)), TuneCommand(algorithm=command.algorithm)
+    held: dict[str, Any] = {
+        "algorithm": algorithm_of(record.options.start),
+        "platform": record.platform,
+        "car": record.car,
+        **{name: getattr(record.options, name) for name in _HELD},
+    }
+    for name, was in held.items():
+        given = getattr(command, name)
+        if given != was and (name == "algorithm" or given != getattr(default, name)):
+            raise ConfigurationError(f"--{name} {given}: {_kept(command)} was begun with {was}; {_ELSE}")
+    if command.start is not None and load_of(command.algorithm, command.start) != record.options.start:
+        raise ConfigurationError(f"--start {command.start}: {_kept(command)} was begun with another; {_ELSE}")
+    budget = command.hours or record.options.budget
+    return replace(record, options=replace(record.options, budget=budget))
 
 
 def _options(command: TuneCommand) -> TuningOptions:
     from ..baselines.tuning.search import TuningOptions
+    from ..baselines.washout.families import ALGORITHMS, load_of
 
-    given = {name: getattr(command, name) for name in ("drives", "budget", "seed")}
+    given: dict[str, Any] = {"drives": command.drives, "budget": command.hours, "seed": command.seed}
     return TuningOptions(
-        start=load_of(command.algorithm, command.start or FAMILIES[command.algorithm].start),
+        start=load_of(command.algorithm, command.start or ALGORITHMS[command.algorithm].start),
         objective=command.objective,
         method=command.method,
         limits=command.limits,
@@ -228,7 +210,7 @@ def _options(command: TuneCommand) -> TuningOptions:
     )
 
 
-def _search(command: TuneCommand, record: Record) -> Search:
+def _search(record: Record, command: TuneCommand, goes_on: bool) -> Search:
     from ..baselines.tuning.objective import Objective
     from ..baselines.tuning.search import Search
 
@@ -236,10 +218,10 @@ def _search(command: TuneCommand, record: Record) -> Search:
     car, platform = find_car(record.car), find_platform(record.platform)
     drives = _drives(options, car)
     spared = _spared(options, drives)
-    objective = Objective(drives, platform, options.objective, command.threads, spared)
+    objective = Objective(drives, platform, options.objective, command.workers, spared)
     names = record.platform, record.car
     search = Search(options, objective, names, _kept(command), record.command)
-    if command.resume:
+    if goes_on:
         search.resume(record)
     return search
 
@@ -266,8 +248,13 @@ def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
     return drives
 
 
-def _write(command: TuneCommand, search: Search) -> None:
+def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
     """The policy, with what is known about it on top."""
+    import yaml
+
+    from ..envs.settings import to_dict
+    from ..train.provenance import commit, hardware, now, versions
+
     options = search.options
     how = "CMA-ES" if options.method == "cma" else "gradient descent"
     goal = "J" if options.objective == "J" else "perceived J"
@@ -277,7 +264,7 @@ def _write(command: TuneCommand, search: Search) -> None:
     told = f"{options.start.name} tuned with {spent} by {how} for {goal} on {many}"
     tuned = search.result(name, told)
     notes = [
-        f"{_MADE_BY}{search.command}" + (", stopped and resumed" if command.resume else ""),
+        f"{_MADE_BY}{search.command}" + (", stopped and resumed" if goes_on else ""),
         f"{now()}, commit {commit() or 'unknown'}, {hardware('cpu')}",
         ", ".join(f"{package} {version}" for package, version in versions().items()),
         f"{spent} simulated in {search.status.steps} steps (budget {options.budget:g} h, and what was begun "
@@ -305,7 +292,7 @@ def _held_out(search: Search) -> Objective:
 
 
 def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
-    found = objective.evaluate([start, tuned])
+    found = objective.judge([start, tuned])
     return [
         f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "
         f"{100.0 * found.at_limit[i]:.3f} % of the time at a limit, "

@@ -51,6 +51,14 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         file.write(data)
 
 
+# What a user names: files, and where a command writes, checked before the work.
+
+
+def is_file(name: str) -> bool:
+    """Whether a word means a file rather than a registered name."""
+    return bool(Path(name).suffix) or len(Path(name).parts) > 1 or Path(name).exists()
+
+
 def check_folder(option: str, folder: Path) -> None:
     """Refuse a folder that cannot be written. It is not made: a wrong argument later leaves nothing behind.
 

@@ -1,9 +1,8 @@
-"""A bar for many drives, one after another."""
+"""Every policy on every maneuver; one that fails does not stop the others."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, MotionCueingError
@@ -23,32 +21,6 @@ from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
-
-
-@contextmanager
-def suite_progress(total: int) -> Iterator[Callable[[str, str], None]]:
-    """A bar on the terminal's error stream, so that the tables can be piped.
-
-    Args:
-        total: Number of drives.
-
-    Yields:
-        To be called before each drive, with two words about it.
-    """
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=total)
-        started = 0
-
-        def advance(what: str, who: str) -> None:
-            nonlocal started
-            bar.update(task, description=f"{what}: {who}", completed=started)
-            started += 1
-
-        yield advance
-
-
-# Runs every policy on every maneuver; one that fails does not stop the others.
 
 
 CueSource = Callable[[], CueTrace]

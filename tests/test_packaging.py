@@ -124,7 +124,7 @@ def test_the_namespace_is_imported_from_the_wheel(installed, tmp_path):
 def test_importing_needs_no_heavy_library(package, tmp_path):
     code = (
         f"import sys, motion_cueing.{package}\n"
-        "print([name for name in ('torch', 'matplotlib', 'jinja2', 'tyro') if name in sys.modules])"
+        "print([name for name in ('torch', 'matplotlib', 'jinja2', 'cyclopts') if name in sys.modules])"
     )
     assert run(sys.executable, "-c", code, cwd=tmp_path).strip() == "[]"
 

@@ -210,10 +210,10 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
     given = {} if path is None else _fields(_recipe(path))
     named = given.get("algo")
     if algo is not None and named not in (None, algo):
-        raise ConfigurationError(f"{path}: it is for algo {named}, but --algo is {algo}; leave one out")
+        raise ConfigurationError(f"{path}: it is for algo {named}, but --algorithm is {algo}; leave one out")
     name = algo or named
     if name is None:
-        raise ConfigurationError(f"--algo is missing; use one of {', '.join(algorithm_names())}")
+        raise ConfigurationError(f"--algorithm is missing; use one of {', '.join(algorithm_names())}")
     default = preset_of(str(name))
     preset = {} if default is None else _fields(default)
     chosen = {key: value for key, value in fields.items() if value is not None}
@@ -221,7 +221,7 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
     if "search" in given:
         # What is varied is meant as a whole.
         merged["search"] = given["search"]
-    config = from_dict(TrainingConfig, merged, str(path) if path is not None else f"--algo {name}")
+    config = from_dict(TrainingConfig, merged, str(path) if path is not None else f"--algorithm {name}")
     if isinstance(config.base, str) and Path(config.base).suffix in (".yaml", ".yml"):
         # The file may not be there any more when the training is resumed.
         config = replace(config, base=load_washout(config.base))

@@ -99,7 +99,7 @@ class Learner(ABC):
 
 
 ALGORITHMS: Final = Registry[type[Learner]]("algorithm", "motion_cueing.algorithms")
-"""Algorithms that ``--algo`` takes; their modules are imported when they are asked for."""
+"""Algorithms that ``--algorithm`` takes; their modules are imported when they are asked for."""
 
 _SHIPPED: Final = "motion_cueing.train.algorithms"
 for _name, _place, _summary in (
@@ -120,7 +120,7 @@ def register(
     """Add an algorithm, which ``train --algo NAME`` then takes.
 
     Args:
-        name: As ``--algo`` takes it.
+        name: As ``--algorithm`` takes it.
         learner: The class, or ``"module:attribute"`` where to find it.
         description: One line for lists.
         replace: Whether it takes the place of one of the same name.
@@ -132,7 +132,7 @@ def register(
 
 
 def algorithm_names() -> list[str]:
-    """Names ``--algo`` takes."""
+    """Names ``--algorithm`` takes."""
     return ALGORITHMS.names()
 
 

@@ -156,7 +156,7 @@ class RunFolder:
             DataError: there is none, or a file of it is broken.
         """
         if not (path / _CONFIG).exists():
-            raise DataError(f"--resume {path}: no training was begun there ({_CONFIG} is missing)")
+            raise DataError(f"--out {path}: no training was begun there ({_CONFIG} is missing)")
         run = cls(path, load(TrainingConfig, path / _CONFIG))
         try:
             run.sessions = list(json.loads((path / _RECORD).read_text(encoding="utf-8"))["sessions"])
@@ -247,7 +247,6 @@ def free_folder(path: Path | None, name: str) -> Path:
             number += 1
         path = _DEFAULT_PARENT / f"{name}-{number}"
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        hint = f"use --resume {path} to go on with it" if (path / _CONFIG).exists() else "name a new one"
-        raise ConfigurationError(f"--out {path}: there is something already; {hint}")
+        raise ConfigurationError(f"--out {path}: there is something already; name a new folder")
     check_folder("--out", path)
     return path

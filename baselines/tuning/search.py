@@ -217,9 +217,7 @@ def load_record(path: Path) -> Record:
     try:
         values: Any = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise DataError(
-            f"{path}: no search can be read ({error.strerror}); begin one without --resume"
-        ) from None
+        raise DataError(f"{path}: no search can be read ({error.strerror})") from None
     except ValueError as error:
         raise DataError(f"{path}: no search can be read ({error}); {_ANEW}") from None
     try:

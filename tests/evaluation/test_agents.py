@@ -73,7 +73,7 @@ def test_the_command_evaluates_a_file(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     agent(name="called otherwise").save("mine.safetensors")
     drive(samples=101).to_csv("weave.csv")
-    words = ["evaluate", "--policy", "mine.safetensors", "no-motion", "--maneuver", "weave.csv"]
+    words = ["evaluate", "--policies", "mine.safetensors", "no-motion", "--maneuvers", "weave.csv"]
     assert main([*words, "--out", "out"]) == 0
     said = capsys.readouterr().out
     assert "mine" in said
@@ -92,7 +92,7 @@ def test_the_command_refuses_what_does_not_fit(tmp_path, monkeypatch, capsys):
         ("cut.safetensors", "paper", "broken or cut off"),
         ("model.zip", "paper", "not a policy"),
     ):
-        words = ["evaluate", "--policy", policy, "--platform", platform, "--out", "out"]
+        words = ["evaluate", "--policies", policy, "--platform", platform, "--out", "out"]
         assert main(words) == 2
         said = capsys.readouterr().err
         assert told in said

@@ -56,7 +56,7 @@ def test_the_command_evaluates_it_on_another_machine(tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     agent(TOLD, name="any").save("any.safetensors")
     drive(samples=101).to_csv("weave.csv")
-    words = ["evaluate", "--policy", "any.safetensors", "--platform", "nads-1", "--maneuver", "weave.csv"]
+    words = ["evaluate", "--policies", "any.safetensors", "--platform", "nads-1", "--maneuvers", "weave.csv"]
     assert main([*words, "--out", "out"]) == 0
     assert "any" in capsys.readouterr().out
     agent(name="one").save("one.safetensors")

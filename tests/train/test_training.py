@@ -201,10 +201,10 @@ def test_a_checkpoint_of_another_training_is_refused(finished, tmp_path):
 
 
 def test_a_folder_with_something_in_it_is_left_alone(finished, tmp_path):
-    with pytest.raises(ConfigurationError, match=f"use --resume {finished.path}"):
+    with pytest.raises(ConfigurationError, match="there is something already; name a new"):
         RunFolder.create(finished.path, finished.config)
     (tmp_path / "x").write_text("mine")
-    with pytest.raises(ConfigurationError, match="name a new one"):
+    with pytest.raises(ConfigurationError, match="name a new folder"):
         RunFolder.create(tmp_path, finished.config)
     with pytest.raises(DataError, match=r"no training was begun there \(config.yaml is missing\)"):
         RunFolder.open(tmp_path)

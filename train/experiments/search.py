@@ -136,7 +136,7 @@ class Search:
             DataError: there is none.
         """
         if not is_search(path):
-            raise DataError(f"--resume {path}: no search was begun there ({JOURNAL} is missing)")
+            raise DataError(f"--out {path}: no search was begun there ({JOURNAL} is missing)")
         return cls(path, load(TrainingConfig, path / _CONFIG))
 
     def study(self) -> optuna.Study:

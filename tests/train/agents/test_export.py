@@ -89,7 +89,7 @@ def test_a_missing_package_is_named(tmp_path, monkeypatch):
 
 def test_the_command_exports_and_reports(tmp_path, capsys):
     agent(name="mine").save(tmp_path / "a.safetensors")
-    words = ["export", "--policy", str(tmp_path / "a.safetensors"), "--onnx", str(tmp_path / "a.onnx")]
+    words = ["export", "--policy", str(tmp_path / "a.safetensors"), "--out", str(tmp_path / "a.onnx")]
     assert main(words) == 0
     said = capsys.readouterr().out
     assert "a.onnx: mine" in said
@@ -100,9 +100,9 @@ def test_the_command_exports_and_reports(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("policy", "out", "told"),
     [
-        ("a.safetensors", "a.txt", "--onnx a.txt: name a file that ends in .onnx"),
+        ("a.safetensors", "a.txt", "--out a.txt: name a file that ends in .onnx"),
         ("none.safetensors", "a.onnx", "there is no such file"),
-        ("a.yaml", "a.onnx", "not an agent"),
+        ("a.yaml", "a.onnx", "is no trained network"),
         ("nosuch", "a.onnx", "nosuch"),
     ],
 )
@@ -110,7 +110,7 @@ def test_wrong_arguments_of_the_command(policy, out, told, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     agent().save("a.safetensors")
     (tmp_path / "a.yaml").write_text("name: washout\nsource: none\n")
-    assert main(["export", "--policy", policy, "--onnx", out]) == 2
+    assert main(["export", "--policy", policy, "--out", out]) == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / out).exists()
 

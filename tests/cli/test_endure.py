@@ -13,13 +13,13 @@ from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
 from motion_cueing.evaluation.endurance.results import EnduranceResults, Endured, EnduredDrive, summarized
-from motion_cueing.evaluation.endurance.run import EnduranceRequest, EnduranceRun, Stopped
+from motion_cueing.evaluation.endurance.run import Asked, Run, Stopped
 from motion_cueing.evaluation.policies import make_policy
 
-from ..studies.bends import PAPER
+from ..evaluation.studies import PAPER
 
 SECONDS = 5.0
-ARGV = ["endure", "--policy", "no-motion", "classical", "--duration", str(SECONDS), "--envs", "2"]
+ARGV = ["endure", "--policies", "no-motion", "classical", "--duration", str(SECONDS), "--envs", "2"]
 
 
 def drive_hours(drives):
@@ -69,7 +69,17 @@ def test_it_writes_everything_and_goes_on(tmp_path, capsys):
 
 def test_a_single_drive_can_be_looked_into(tmp_path, capsys):
     seed = drive_seeds(2, 7)[1]
-    argv = ["endure", "--policy", "classical", "--duration", "6", "--only", str(seed), "--out", str(tmp_path)]
+    argv = [
+        "endure",
+        "--policies",
+        "classical",
+        "--duration",
+        "6",
+        "--seeds",
+        str(seed),
+        "--out",
+        str(tmp_path),
+    ]
     assert main(argv) == 0
     (drive,) = EnduranceResults.load_json(tmp_path / "endurance.json").policies["classical"].drives
     cues = CueTrace.from_csv(tmp_path / f"{drive.name}.csv")
@@ -79,9 +89,7 @@ def test_a_single_drive_can_be_looked_into(tmp_path, capsys):
 
 
 def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
-    asked = EnduranceRequest(
-        Endurance(duration=2.0), PAPER, {"classical": "classical"}, drive_seeds(4, 0), 2, tmp_path
-    )
+    asked = Asked(Endurance(duration=2.0), PAPER, {"classical": "classical"}, drive_seeds(4, 0), 2, tmp_path)
     done = []
 
     def tell(what, seconds):
@@ -89,17 +97,17 @@ def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
         if sum(done) > 4 * 2.0:
             raise Stopped
 
-    found = EnduranceRun(asked).drive(tell)
+    found = Run(asked).drive(tell)
     assert not found.finished
     assert found.driven == len(found.policies["classical"].drives) == 2
-    again = EnduranceRun(asked)
+    again = Run(asked)
     assert again.seconds == 2 * 2 * 2.0
     found = again.drive(lambda what, seconds: None)
     assert found.finished
     assert (found.driven, len(found.policies["classical"].drives)) == (2, 4)
     # Another way of driving is another key: nothing of this is taken.
-    other = EnduranceRequest(Endurance(duration=3.0), PAPER, asked.policies, asked.seeds, 2, tmp_path)
-    assert EnduranceRun(other).seconds == 4 * 2 * 3.0
+    other = Asked(Endurance(duration=3.0), PAPER, asked.policies, asked.seeds, 2, tmp_path)
+    assert Run(other).seconds == 4 * 2 * 3.0
 
 
 def test_ctrl_c_ends_it_with_what_was_driven(tmp_path, capsys, monkeypatch):
@@ -133,13 +141,13 @@ def test_drives_in_one():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--policy", "classikal"], "classical"),
+        (["--policies", "classikal"], "classical"),
         (["--hours", "0"], "hours must be positive"),
         (["--hours", "inf"], "hours must be positive and finite"),
         (["--envs", "-1"], "envs must be positive"),
         (["--lag", "60", "30"], "from low to high"),
         (["--dead-time", "0.1"], "--dead-time"),
-        (["--only", "-5"], "seed is -5"),
+        (["--seeds", "-5"], "seed is -5"),
     ],
 )
 def test_wrong_arguments_are_told_in_one_line(words, told, tmp_path, capsys):
@@ -150,14 +158,14 @@ def test_wrong_arguments_are_told_in_one_line(words, told, tmp_path, capsys):
 
 
 def test_damaged_drives_and_foreign_results_are_refused(tmp_path, capsys):
-    argv = ["endure", "--policy", "no-motion", "--duration", "2", *drive_hours(1), "--out", str(tmp_path)]
+    argv = ["endure", "--policies", "no-motion", "--duration", "2", *drive_hours(1), "--out", str(tmp_path)]
     assert main(argv) == 0
     (kept,) = (tmp_path / "drives").iterdir()
     kept.write_text("{")
     assert main(argv) == 2
     assert f"{kept}: damaged" in capsys.readouterr().err
     # A wrong policy forgets nothing, and only what these policies drove is driven again.
-    assert main([*argv, "--fresh", "--policy", "no-motion", "nobody.safetensors"]) == 2
+    assert main([*argv, "--fresh", "--policies", "no-motion", "nobody.safetensors"]) == 2
     assert kept.read_text() == "{"
     (tmp_path / "drives" / "mine.txt").write_text("not of this command")
     assert main([*argv, "--fresh"]) == 0

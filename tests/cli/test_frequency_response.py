@@ -18,7 +18,7 @@ from motion_cueing.evaluation.metrics import CUE_AXES
 
 def test_the_command_writes_everything_and_reads_it_again(tmp_path, capsys):
     out = tmp_path / "out"
-    argv = ["frequency-response", "--policy", "no-motion", "classical", "--frequencies", "15.0", "9.0"]
+    argv = ["frequency-response", "--policies", "no-motion", "classical", "--frequencies", "15.0", "9.0"]
     assert (
         main([*argv, "--axes", "f_y", "w_z", "--amplitude", "0.5", "--settling", "1", "--out", str(out)]) == 0
     )
@@ -41,7 +41,7 @@ def test_the_command_writes_everything_and_reads_it_again(tmp_path, capsys):
 def quick(*policies):
     return [
         "frequency-response",
-        "--policy",
+        "--policies",
         *policies,
         "--frequencies",
         "15",
@@ -63,8 +63,8 @@ class Tired:
 def ladder(monkeypatch):
     """A ladder of three: one that can be tested, one that knows its drives alone, one that fails."""
     monkeypatch.setattr(
-        "motion_cueing.evaluation.selection.benchmark_policies",
-        lambda known: ["no-motion", "classical-per-maneuver", "adaptive"],
+        "motion_cueing.evaluation.benchmark.ladder_names",
+        lambda known: ["no-motion", "classical-ceiling", "adaptive"],
     )
     made = policies.make_policy
     monkeypatch.setattr(
@@ -75,16 +75,13 @@ def ladder(monkeypatch):
 def test_the_ladder_leaves_out_what_knows_no_sinusoids_and_goes_on_after_a_failure(ladder, tmp_path, capsys):
     assert main([*quick("benchmark"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
-    assert (
-        "left out classical-per-maneuver: classical-per-maneuver has a set for each standard maneuver"
-        in shown
-    )
+    assert "left out classical-ceiling: classical-ceiling has a set for each standard maneuver" in shown
     assert "failed adaptive: RuntimeError: tired" in shown
     assert [one.policy for one in load_json(tmp_path / "frequency-response.json")] == ["no-motion"]
 
 
 def test_a_policy_that_knows_no_sinusoids_is_refused_before_anything_is_measured(tmp_path, capsys):
-    assert main([*quick("no-motion", "classical-per-maneuver"), "--out", str(tmp_path / "out")]) == 2
+    assert main([*quick("no-motion", "classical-ceiling"), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert "none for sinusoids" in told
     assert "classical-tuned" in told
@@ -128,11 +125,11 @@ def test_titles_say_how_large_the_inputs_are():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--policy", "classikal"], "classical"),
-        (["--policy", "classical", "--axes", "f_w"], "unknown axis"),
-        (["--policy", "classical", "--amplitude", "0"], "--amplitude"),
-        (["--policy", "classical", "--frequencies", "1000"], "frequencies"),
-        ([], "policy"),
+        (["--policies", "classikal"], "classical"),
+        (["--policies", "classical", "--axes", "f_w"], "unknown axis"),
+        (["--policies", "classical", "--amplitude", "0"], "--amplitude"),
+        (["--policies", "classical", "--frequencies", "1000"], "frequencies"),
+        ([], "--policies must be given"),
     ],
 )
 def test_wrong_arguments_are_told_in_one_line(words, told, capsys):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
-from motion_cueing.baselines.washout.classical import per_maneuver
-from motion_cueing.baselines.washout.classical.per_maneuver import load_per_maneuver
+from motion_cueing.baselines.washout import families as ceiling
+from motion_cueing.baselines.washout.families import load_ceiling
 from motion_cueing.cli.main import main
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
@@ -28,7 +28,7 @@ from motion_cueing.train.algorithms.dagger.demonstrations import (
     load_index,
 )
 
-from ..baselines.optimum.drives import surge
+from ..optimum.drives import surge
 
 WASHOUT = ("--policy", "classical")
 
@@ -45,7 +45,7 @@ def record(*words: str) -> int:
 
 
 def test_a_recording_is_what_happened(folder):
-    assert record(*WASHOUT, "--maneuver", "sine-with-dwell") == 0
+    assert record(*WASHOUT, "--maneuvers", "sine-with-dwell") == 0
     (drive,) = load_demonstrations(folder)
     (entry,) = load_index(folder).drives
     cues = get_maneuver("sine-with-dwell").drive()
@@ -61,7 +61,7 @@ def test_a_recording_is_what_happened(folder):
 
 def test_the_optimum_demonstrates(folder, tmp_path, capsys):
     surge(1.0, 1.0).to_csv(tmp_path / "surge.csv")
-    assert record("--maneuver", "surge.csv") == 0
+    assert record("--maneuvers", "surge.csv") == 0
     told = capsys.readouterr().out
     (entry,) = load_index(folder).drives
     assert entry.name == "surge"
@@ -73,13 +73,13 @@ def test_the_optimum_demonstrates(folder, tmp_path, capsys):
 
 
 def test_a_recording_goes_on_where_it_was_stopped(folder, capsys):
-    words = (*WASHOUT, "--random", "2", "--duration", "4", "--seed", "3")
+    words = (*WASHOUT, "--drives", "2", "--duration", "4", "--seed", "3")
     assert record(*words) == 0
     first = load_index(folder)
     assert len(first.drives) == 2
     (folder / first.drives[1].file).unlink()
     before = (folder / first.drives[0].file).stat().st_mtime_ns
-    assert record(*words, "--maneuver", "sine-with-dwell") == 0
+    assert record(*words, "--maneuvers", "sine-with-dwell") == 0
     assert "3 drives (2 new)" in capsys.readouterr().out
     again = load_index(folder)
     assert {drive.name: drive.sha256 for drive in first.drives}.items() <= {
@@ -89,10 +89,22 @@ def test_a_recording_goes_on_where_it_was_stopped(folder, capsys):
     assert again.provenance == first.provenance
 
 
+def test_fresh_begins_anew_even_with_another_controller(folder, capsys):
+    words = ("--drives", "1", "--duration", "1", "--seed", "3")
+    assert record(*WASHOUT, *words) == 0
+    (folder / "notes.txt").write_text("mine")
+    assert record("--policy", "no-motion", *words) == 2
+    assert "name another --out, or add --fresh to begin anew" in capsys.readouterr().err
+    assert record("--policy", "no-motion", *words, "--fresh") == 0
+    assert "1 drives (1 new)" in capsys.readouterr().out
+    assert load_index(folder).setting["policy"] == "no-motion"
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
 def test_a_drive_whose_cues_have_changed_is_recorded_anew(folder, tmp_path, capsys):
     for name in ("first", "second"):
         surge(1.0, 1.0).to_csv(tmp_path / f"{name}.csv")
-    words = (*WASHOUT, "--maneuver", "first.csv", "second.csv")
+    words = (*WASHOUT, "--maneuvers", "first.csv", "second.csv")
     assert record(*words) == 0
     before = {drive.name: drive for drive in load_index(folder).drives}
     assert before["first"].cues == CueTrace.from_csv("first.csv").digest()
@@ -114,7 +126,7 @@ def test_a_drive_whose_cues_have_changed_is_recorded_anew(folder, tmp_path, caps
 
 def test_a_car_whose_file_has_changed_is_refused(folder, tmp_path, capsys):
     car = get_car("sedan")
-    words = (*WASHOUT, "--maneuver", "sine-with-dwell", "--car", "mine.yaml")
+    words = (*WASHOUT, "--maneuvers", "sine-with-dwell", "--car", "mine.yaml")
     save(replace(car, name="mine"), tmp_path / "mine.yaml")
     assert record(*words) == 0
     assert load_index(folder).setting["car"]["mass"] == car.mass
@@ -125,11 +137,11 @@ def test_a_car_whose_file_has_changed_is_refused(folder, tmp_path, capsys):
     assert "holds drives of another controller, car" in capsys.readouterr().err
 
 
-def test_an_oracle_of_other_sets_is_refused(folder, monkeypatch, capsys):
-    words = ("--policy", "classical-per-maneuver", "--maneuver", "sine-with-dwell")
+def test_a_ceiling_of_other_sets_is_refused(folder, monkeypatch, capsys):
+    words = ("--policy", "classical-ceiling", "--maneuvers", "sine-with-dwell")
     assert record(*words) == 0
-    edited = replace(load_per_maneuver("sine-with-dwell"), turntable_share=0.25)
-    monkeypatch.setattr(per_maneuver, "load_per_maneuver", lambda name: edited)
+    edited = replace(load_ceiling("sine-with-dwell"), turntable_share=0.25)
+    monkeypatch.setattr(ceiling, "load_ceiling", lambda name: edited)
     assert record(*words) == 2
     assert "holds drives of another controller" in capsys.readouterr().err
 
@@ -160,8 +172,8 @@ def test_a_demonstrator_is_watched_as_it_is():
 
 
 def test_a_folder_of_another_controller_is_refused(folder, capsys):
-    assert record(*WASHOUT, "--random", "1", "--duration", "1") == 0
-    assert record("--policy", "no-motion", "--random", "1", "--duration", "1") == 2
+    assert record(*WASHOUT, "--drives", "1", "--duration", "1") == 0
+    assert record("--policy", "no-motion", "--drives", "1", "--duration", "1") == 2
     assert "holds drives of another controller" in capsys.readouterr().err
 
 
@@ -169,11 +181,11 @@ def test_a_folder_of_another_controller_is_refused(folder, capsys):
     ("words", "told"),
     [
         ((), "nothing to drive"),
-        (("--random", "-1"), "--random must not be negative"),
-        (("--random", "1", "--policy", "classical", "--objective", "perceived"), "--objective perceived"),
-        (("--random", "1", "--policy", "learned-preview"), "an agent sees"),
-        (("--random", "1", "--policy", "clasical"), "Did you mean"),
-        (("--maneuver", "no-such-drive"), "unknown maneuver"),
+        (("--drives", "-1"), "--drives must not be negative"),
+        (("--drives", "1", "--policy", "classical", "--objective", "perceived"), "--objective perceived"),
+        (("--drives", "1", "--policy", "learned-preview"), "an agent sees"),
+        (("--drives", "1", "--policy", "clasical"), "Did you mean"),
+        (("--maneuvers", "no-such-drive"), "unknown maneuver"),
     ],
 )
 def test_wrong_arguments_are_refused(folder, capsys, words, told):
@@ -185,13 +197,13 @@ def test_wrong_arguments_are_refused(folder, capsys, words, told):
 def test_another_ones_index_is_not_replaced(folder, capsys):
     folder.mkdir()
     (folder / "index.json").write_text("hello")
-    assert record(*WASHOUT, "--random", "1") == 2
+    assert record(*WASHOUT, "--drives", "1") == 2
     assert "not JSON" in capsys.readouterr().err
     assert (folder / "index.json").read_text() == "hello"
 
 
 def test_broken_recordings_are_refused(folder):
-    assert record(*WASHOUT, "--random", "1", "--duration", "1") == 0
+    assert record(*WASHOUT, "--drives", "1", "--duration", "1") == 0
     (entry,) = load_index(folder).drives
     path = folder / entry.file
     path.write_bytes(path.read_bytes()[:-1])

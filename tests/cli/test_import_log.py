@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tyro
 
 from motion_cueing.cli.import_log import ImportCommand, run
-from motion_cueing.cli.main import main
+from motion_cueing.cli.main import main, parse
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
 from motion_cueing.envs.logs.columns import parse_columns
@@ -25,16 +24,16 @@ def log(tmp_path: Path) -> Path:
 
 
 def parsed(*arguments: str) -> ImportCommand:
-    return tyro.cli(ImportCommand, args=list(arguments))
+    return parse("import", arguments)
 
 
 def test_columns_once_or_repeated() -> None:
-    once = parsed("log.csv", "--column", "time=t:ms", "speed=v", "--out", "cues.csv")
-    repeated = parsed("log.csv", "--column", "time=t:ms", "--column", "speed=v", "--out", "cues.csv")
-    assert [text for group in once.column for text in group] == ["time=t:ms", "speed=v"]
-    assert [text for group in repeated.column for text in group] == ["time=t:ms", "speed=v"]
+    once = parsed("log.csv", "--columns", "time=t:ms", "speed=v", "--out", "cues.csv")
+    repeated = parsed("log.csv", "--columns", "time=t:ms", "--columns", "speed=v", "--out", "cues.csv")
+    assert once.columns == ("time=t:ms", "speed=v")
+    assert repeated.columns == ("time=t:ms", "speed=v")
     options = parsed(
-        "log.csv", "--column", "a=b", "--out", "x", "--gaps", "bridge", "--yaw-deg", "-90"
+        "log.csv", "--columns", "a=b", "--out", "x", "--gaps", "bridge", "--yaw-deg", "-90"
     ).conversion
     assert (options.gaps, options.yaw_deg) == ("bridge", -90.0)
 
@@ -52,7 +51,7 @@ def test_column_texts() -> None:
 
 def test_files_and_findings(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, plot = tmp_path / "cues.csv.gz", tmp_path / "plot.png"
-    arguments = [str(log), "--column", *TEXTS, "--out", str(out), "--plot", str(plot), "--decimals", "4"]
+    arguments = [str(log), "--columns", *TEXTS, "--out", str(out), "--plot", str(plot), "--decimals", "4"]
     assert main(["import", *arguments]) == 0
     said = capsys.readouterr().out
     assert "yaw 28.6 deg" in said
@@ -67,7 +66,7 @@ def test_files_and_findings(log: Path, tmp_path: Path, capsys: pytest.CaptureFix
 def test_a_log_without_speed_still_has_a_picture(log: Path, tmp_path: Path) -> None:
     plot = tmp_path / "plot.png"
     texts = [text for text in TEXTS if not text.startswith("speed")]
-    arguments = [str(log), "--column", *texts, "--out", str(tmp_path / "c.csv"), "--plot", str(plot)]
+    arguments = [str(log), "--columns", *texts, "--out", str(tmp_path / "c.csv"), "--plot", str(plot)]
     assert run(parsed(*arguments, "--yaw-deg", "28.6")) == 0
     assert plot.read_bytes().startswith(b"\x89PNG")
 
@@ -75,11 +74,11 @@ def test_a_log_without_speed_still_has_a_picture(log: Path, tmp_path: Path) -> N
 def test_bad_input_writes_nothing(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "cues.csv"
     cases = {
-        "--decimals": (["--column", *TEXTS, "--decimals", "-1"], "decimals is -1; use 0 to 15"),
-        "column": (["--column", "time=t"], "no column for force_x"),
-        "name": (["--column", "tim=t"], "Did you mean time"),
-        "missing": (["--column", *TEXTS[1:], "time=stamp"], "missing column stamp"),
-        "cutoff": (["--column", *TEXTS, "--cutoff-hz", "-1"], "cutoff_hz"),
+        "--decimals": (["--columns", *TEXTS, "--decimals", "-1"], "decimals is -1; use 0 to 15"),
+        "column": (["--columns", "time=t"], "no column for force_x"),
+        "name": (["--columns", "tim=t"], "Did you mean time"),
+        "missing": (["--columns", *TEXTS[1:], "time=stamp"], "missing column stamp"),
+        "cutoff": (["--columns", *TEXTS, "--cutoff-hz", "-1"], "--cutoff-hz must be greater than 0"),
     }
     for arguments, message in cases.values():
         assert main(["import", str(log), "--out", str(out), *arguments]) == 2
@@ -92,20 +91,20 @@ def test_bad_input_writes_nothing(log: Path, tmp_path: Path, capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--cutoff-hz", "0", "'cutoff_hz': Input should be greater than 0"),
-        ("--cutoff-hz", "nan", "'cutoff_hz': Input should be a finite number"),
-        ("--cutoff-hz", "50", "'cutoff_hz': must be below half of rate_hz, 50 Hz"),
-        ("--rate-hz", "0", "'rate_hz': Input should be greater than or equal to 2"),
-        ("--rate-hz", "1e9", "'rate_hz': Input should be less than or equal to 1000"),
-        ("--rate-hz", "9", "'cutoff_hz': must be below half of rate_hz, 4.5 Hz"),
-        ("--gravity-m-s2", "0", "'gravity_m_s2': Input should be greater than 0"),
+        ("--cutoff-hz", "0", "--cutoff-hz must be greater than 0, found 0"),
+        ("--cutoff-hz", "nan", "--cutoff-hz must be a finite number, found nan"),
+        ("--cutoff-hz", "50", "--cutoff-hz must be below half of rate_hz, 50 Hz, found 50"),
+        ("--rate-hz", "0", "--rate-hz must be greater than or equal to 2, found 0"),
+        ("--rate-hz", "1e9", "--rate-hz must be less than or equal to 1000, found 1e9"),
+        ("--rate-hz", "9", "--cutoff-hz must be below half of rate_hz, 4.5 Hz, found 5.0"),
+        ("--gravity-m-s2", "0", "--gravity-m-s2 must be greater than 0, found 0"),
     ],
 )
 def test_a_wrong_option_is_told_in_one_plain_line(
     option: str, value: str, message: str, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "cues.csv"
-    assert main(["import", str(log), "--column", *TEXTS, "--out", str(out), option, value]) == 2
+    assert main(["import", str(log), "--columns", *TEXTS, "--out", str(out), option, value]) == 2
     said = capsys.readouterr().err
     assert message in said
     assert said.count("\n") == 1
@@ -136,7 +135,7 @@ def test_targets_that_cannot_be_written_are_refused_first(
     before = sorted(tmp_path.rglob("*"))
     paths = {"--out": tmp_path / "cues.csv", "--plot": tmp_path / "plot.png"} | {option: tmp_path / target}
     targets = [word for name, path in paths.items() for word in (name, str(path))]
-    assert main(["import", str(tmp_path / "log.png"), "--column", *TEXTS, *targets]) == 2
+    assert main(["import", str(tmp_path / "log.png"), "--columns", *TEXTS, *targets]) == 2
     said = capsys.readouterr().err
     assert f"{option} {tmp_path / target}" in said
     assert message in said
@@ -152,7 +151,7 @@ def test_a_folder_without_permission_is_refused_first(
 
     (tmp_path / "locked").mkdir()
     monkeypatch.setattr("motion_cueing.envs.storage.probe", denied)
-    arguments = [str(log), "--column", *TEXTS, "--out", str(tmp_path / "cues.csv")]
+    arguments = [str(log), "--columns", *TEXTS, "--out", str(tmp_path / "cues.csv")]
     with pytest.raises(DataError, match=r"--plot .*locked/plot.png cannot be written \(Permission"):
         run(parsed(*arguments, "--plot", str(tmp_path / "locked" / "plot.png")))
     assert not (tmp_path / "cues.csv").exists()
@@ -161,7 +160,7 @@ def test_a_folder_without_permission_is_refused_first(
 def test_the_log_is_never_overwritten(log: Path) -> None:
     before = log.read_bytes()
     with pytest.raises(ConfigurationError, match="is the log itself"):
-        run(parsed(str(log), "--column", *TEXTS, "--out", str(log)))
+        run(parsed(str(log), "--columns", *TEXTS, "--out", str(log)))
     assert log.read_bytes() == before
     with pytest.raises(DataError, match="cannot be read"):
-        run(parsed("missing.csv", "--column", *TEXTS, "--out", "cues.csv"))
+        run(parsed("missing.csv", "--columns", *TEXTS, "--out", "cues.csv"))

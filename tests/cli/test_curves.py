@@ -37,7 +37,7 @@ def test_a_curve_holds_the_rows_that_have_the_scalar(runs):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--out", "x.png"], "name at least one folder"),
+        (["--out", "x.png"], "--runs must be given"),
         (["RUN", "--out", "x.pdf"], "ends in .png or .svg"),
         (["RUN", "--out", "x.png", "--scalar", "validation/j"], "validation/J"),
         (["nowhere", "--out", "x.png"], "no log of a training"),
