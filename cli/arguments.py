@@ -153,7 +153,7 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
 
     A file is never labeled as a shipped policy: normalized scores refer to those.
     """
-    from ..evaluation.benchmark import ladder_names
+    from ..evaluation.benchmark import benchmark_policies
     from ..evaluation.policies import default_policies, is_reference, policy_names
     from ..evaluation.suite import labels
 
@@ -161,7 +161,7 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
     expanded = [
         name
         for given in list(names) or default_policies(platform)
-        for name in (ladder_names(known) if given == BENCHMARK else [given])
+        for name in (benchmark_policies(known) if given == BENCHMARK else [given])
     ]
     stems = [
         name.rpartition(":")[2] if is_reference(name) else _stem("policy", name, [*known, BENCHMARK])

@@ -46,9 +46,10 @@ def run(command: CompareCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
+    from ..evaluation.policies import make_policy
     from ..evaluation.reporting.text import words_of
     from ..evaluation.studies.figures import lines_figure
-    from ..evaluation.studies.study import Condition, policy_on
+    from ..evaluation.studies.study import Condition
     from .studies import prepare, run_and_save
 
     machines = find_platforms(command.platforms, command.ablations)
@@ -57,7 +58,14 @@ def run(command: CompareCommand) -> int:
     policies = find_policies(command.policies, next(iter(machines.values())))
     prepare(command.out, command.fresh)
     conditions = [
-        Condition(name, machine.description, machine, car, maneuvers, partial(policy_on, platform=machine))
+        Condition(
+            name,
+            machine.description,
+            machine,
+            car,
+            maneuvers,
+            partial(make_policy, platform=machine, force=True),
+        )
         for name, machine in machines.items()
     ]
     return run_and_save(

@@ -120,7 +120,7 @@ def _sources(command: DemonstrateCommand) -> dict[str, CueSource]:
 
 
 def _random_sources(command: DemonstrateCommand) -> Iterator[tuple[str, CueSource]]:
-    from ..envs.maneuvers.random_drives import RandomDrives, drive_seeds, random_drive
+    from ..envs.maneuvers.sampling import RandomDrives, drive_seeds, random_drive
 
     for seed in drive_seeds(command.drives, command.seed):
         name = RandomDrives().plan(seed, command.duration).name
@@ -153,8 +153,8 @@ def _index(command: DemonstrateCommand, setting: dict[str, Any]) -> Index:
     Raises:
         ConfigurationError: the folder holds drives of another controller, car or motion base.
     """
+    from ..envs.provenance import command_line, commit, hardware, now, versions
     from ..train.algorithms.dagger.demonstrations import INDEX, Index, load_index
-    from ..train.provenance import command_line, commit, hardware, now, versions
 
     if (command.out / INDEX).exists():
         index = load_index(command.out)
@@ -182,7 +182,7 @@ def _index(command: DemonstrateCommand, setting: dict[str, Any]) -> Index:
 def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator) -> DriveEntry:
     from ..evaluation.demonstrations import demonstrate
     from ..evaluation.metrics import measure
-    from ..evaluation.rollout import notes_of
+    from ..evaluation.rollout import statistics_of
     from ..train.algorithms.dagger.demonstrations import DriveEntry, save_drive
 
     record, drive = demonstrate(demonstrator, name, cues)
@@ -198,7 +198,7 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
         cue_error=found.cue_error,
         perceived_cue_error=found.perceived_cue_error,
         at_limit=found.at_limit,
-        notes=notes_of(record.metadata),
+        notes=statistics_of(record.metadata),
     )
 
 

@@ -61,21 +61,21 @@ def run(command: DriveCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    from ..realtime.client import Client, Trouble, cues_at
+    from ..envs.interrupt import Interrupt
+    from ..realtime.client import Client, NetworkFaults, cues_at
     from ..realtime.packets import make_format
     from ..realtime.server import Endpoint, address_of, is_loopback
     from ..realtime.timing import undisturbed
-    from ..train.training import Interrupt
 
     _check(command)
     trace = find_maneuver(command.maneuver, find_car(command.car))[1]()
     to = address_of(command.to, DEFAULT_PORT)
-    trouble = Trouble(command.drop, command.repeat, command.late, command.nan, command.seed)
+    network = NetworkFaults(command.drop, command.repeat, command.late, command.nan, command.seed)
     # From the loopback address nothing leaves this machine; other targets are reached from any.
     endpoint = Endpoint(("127.0.0.1" if is_loopback(to) else "0.0.0.0", 0))
     try:
         platform, form = find_platform(command.platform), make_format(command.format)
-        client = Client(endpoint, to, form, platform, command.rate, trouble)
+        client = Client(endpoint, to, form, platform, command.rate, network)
         interrupt = Interrupt()
         with interrupt.caught(), undisturbed(command.cpu):
             client.run(cues_at(trace, command.rate, command.times), lambda: interrupt.asked)
@@ -94,7 +94,7 @@ def _check(command: DriveCommand) -> None:
 
 def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
     from ..evaluation.reporting.text import words_of
-    from ..realtime.report import report_of, tell
+    from ..realtime.report import report_of, show
 
     if not client.counts["received"]:
         raise OSError(None, "nothing came back; is `motion-cueing serve` running there?", command.to)
@@ -106,5 +106,5 @@ def _finish(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
         states=client.states,
         faults=client.faults,
     )
-    tell(report, "set-points", command.report)
+    show(report, "set-points", command.report)
     return 1 if client.counts["outside_limits"] else 0

@@ -27,7 +27,7 @@ from .arguments import (
 if TYPE_CHECKING:
     from ..evaluation.endurance import Endurance
     from ..evaluation.endurance.results import EnduranceResults
-    from ..evaluation.endurance.run import Asked, Found, Tell
+    from ..evaluation.endurance.run import EnduranceOutcome, EnduranceRequest, Progress
 
 _WITHSTOOD: Final = 0
 _FAILED: Final = 1
@@ -73,10 +73,10 @@ def run(command: EndureCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    from ..evaluation.endurance.run import Run
+    from ..evaluation.endurance.run import EnduranceRun
 
     asked = _asked(command)
-    driving = Run(asked, command.fresh)
+    driving = EnduranceRun(asked, command.fresh)
     with _progress(driving.seconds) as tell:
         found = driving.drive(tell)
     results = _results(command, asked, found)
@@ -87,9 +87,9 @@ def run(command: EndureCommand) -> int:
     return _WITHSTOOD if all(one.withstood for one in results.summaries.values()) else _FAILED
 
 
-def _asked(command: EndureCommand) -> Asked:
+def _asked(command: EndureCommand) -> EnduranceRequest:
     from ..envs.maneuvers import drive_seeds
-    from ..evaluation.endurance.run import Asked
+    from ..evaluation.endurance.run import EnduranceRequest
 
     for name, value in (("hours", command.hours), ("duration", command.duration), ("envs", command.envs)):
         if not 0 < value < math.inf:
@@ -98,7 +98,7 @@ def _asked(command: EndureCommand) -> Asked:
     check_own_json("--out", command.out / "endurance.json", frozenset({"schema", "endurance"}))
     platform = find_platform(command.platform)
     count = math.ceil(3600.0 * command.hours / command.duration)
-    return Asked(
+    return EnduranceRequest(
         endurance=_endurance(command),
         platform=platform,
         policies=find_policies(command.policies, platform),
@@ -120,10 +120,10 @@ def _endurance(command: EndureCommand) -> Endurance:
 
 
 @contextmanager
-def _progress(seconds: float) -> Iterator[Tell]:
+def _progress(seconds: float) -> Iterator[Progress]:
     """A bar on the error stream; Ctrl-C stops the drive when the bar next moves."""
+    from ..envs.interrupt import Interrupt
     from ..evaluation.endurance.run import Stopped
-    from ..train.training import Interrupt
 
     interrupt = Interrupt()
     with interrupt.caught(), progress(seconds, "s of drives") as bar:
@@ -136,15 +136,14 @@ def _progress(seconds: float) -> Iterator[Tell]:
         yield tell
 
 
-def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceResults:
+def _results(command: EndureCommand, asked: EnduranceRequest, found: EnduranceOutcome) -> EnduranceResults:
     from ..envs.simulator.simulator import TIME_STEP
     from ..evaluation.endurance.results import EnduranceResults, summarized
-    from ..evaluation.provenance import head_of
     from ..evaluation.reporting.text import words_of
 
     driven = {name: one for name, one in found.policies.items() if one.drives}
     return EnduranceResults(
-        **head_of(EnduranceResults, words_of("endure", command)),
+        **EnduranceResults.head(words_of("endure", command)),
         platform=asked.platform.name,
         endurance=asked.endurance,
         finished=found.finished,
@@ -153,7 +152,7 @@ def _results(command: EndureCommand, asked: Asked, found: Found) -> EnduranceRes
     )
 
 
-def _write(command: EndureCommand, asked: Asked, results: EnduranceResults) -> None:
+def _write(command: EndureCommand, asked: EnduranceRequest, results: EnduranceResults) -> None:
     from ..evaluation.endurance.results import tables
     from ..evaluation.endurance.run import seeded_drives
     from ..evaluation.reporting.text import save_markdown
@@ -165,15 +164,15 @@ def _write(command: EndureCommand, asked: Asked, results: EnduranceResults) -> N
         drive.cues.to_csv(command.out / f"{drive.cues.name}.csv")
 
 
-def _print(command: EndureCommand, results: EnduranceResults, found: Found) -> None:
+def _print(command: EndureCommand, results: EnduranceResults, found: EnduranceOutcome) -> None:
     from ..evaluation.endurance.results import tables
     from ..evaluation.reporting.text import how_many, print_table, table_console
 
     console = table_console()
     for table in tables(results):
         print_table(console, table)
-    if found.left_out:
-        told = how_many(len(found.left_out), "drive")
+    if found.skipped:
+        told = how_many(len(found.skipped), "drive")
         console.print(f"{told} left out: the car left the range of its model", highlight=False)
     state = "" if found.finished else "interrupted, the same command goes on; "
     console.print(

@@ -77,12 +77,12 @@ class _Output:
 
     def finish(self, maneuver: str, drives: Mapping[str, Trajectory]) -> None:
         """Save trajectories and figure of a maneuver."""
-        from ..evaluation.reporting.figures import maneuver_figure
+        from ..evaluation.reporting.figures import maneuver_figure, png
 
         for policy, drive in drives.items():
             name = f"{self.maneuvers[maneuver]}--{self.policies[policy]}.npz"
             drive.save(self.folder / "trajectories" / name)
-        self.figures[maneuver] = maneuver_figure(drives, list(self.policies))
+        self.figures[maneuver] = png(maneuver_figure(drives, list(self.policies)))
         write_bytes(self.folder / f"{self.maneuvers[maneuver]}.png", self.figures[maneuver])
 
 
@@ -104,7 +104,7 @@ def report(plan: Plan, ranked: bool) -> int:
         plan: What is driven.
         ranked: Whether the table of the benchmark is printed as well.
     """
-    from ..evaluation.benchmark import ladder_table
+    from ..evaluation.benchmark import benchmark_table
     from ..evaluation.reporting.tables import print_results
     from ..evaluation.reporting.text import print_table, table_console
 
@@ -112,8 +112,8 @@ def report(plan: Plan, ranked: bool) -> int:
     save(results, figures, plan.out)
     console = table_console()
     print_results(console, results)
-    if ranked and results.standings:
-        print_table(console, ladder_table(results))
+    if ranked and results.scores:
+        print_table(console, benchmark_table(results))
     console.print(
         f"Everything is in {plan.out}; open {plan.out / 'report.html'}", highlight=False, markup=False
     )
@@ -175,29 +175,23 @@ def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
 
 def collect(plan: Plan, outcome: Outcome) -> Results:
     """The results of an outcome, with what made them."""
-    from ..envs.settings import to_dict
-    from ..evaluation.provenance import provenance
-    from ..evaluation.results import Results
+    from ..evaluation.results import Provenance, Results
 
-    origin = provenance(
-        plan.arguments,
-        (plan.platform.name, to_dict(plan.platform)),
-        (plan.car.name, to_dict(plan.car)),
-        outcome.metadata,
-    )
-    return Results.of(outcome.maneuvers, outcome.failures, origin, left_out=plan.skipped, notes=outcome.notes)
+    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata)
+    return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.skipped, notes=outcome.notes)
 
 
 def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
     """Write results.json, results.csv, the benchmark and report.html into a folder."""
-    from ..evaluation.benchmark import save_ladder
-    from ..evaluation.reporting.figures import ladder_figure
+    from ..evaluation.benchmark import save_benchmark
+    from ..evaluation.reporting.figures import benchmark_figure, png
     from ..evaluation.reporting.report import save_report
 
     results.save_json(folder / "results.json")
     results.save_csv(folder / "results.csv")
-    ladder = ladder_figure(results)
-    if ladder is not None:
-        save_ladder(results, folder)
-        write_bytes(folder / "ladder.png", ladder)
-    save_report(results, figures, folder / "report.html", ladder)
+    figure = benchmark_figure(results)
+    image = None if figure is None else png(figure)
+    if image is not None:
+        save_benchmark(results, folder)
+        write_bytes(folder / "benchmark.png", image)
+    save_report(results, figures, folder / "report.html", image)

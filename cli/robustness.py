@@ -89,7 +89,7 @@ def make_study(command: RobustnessCommand) -> Study:
         MotionCueingError: an argument is wrong.
     """
     from ..envs.maneuvers import maneuver_names
-    from ..evaluation.benchmark import ladder_names
+    from ..evaluation.benchmark import benchmark_policies
     from ..evaluation.policies import policy_names
     from ..evaluation.studies.disturbances import Disturbances, SensorNoise, Study
 
@@ -98,7 +98,7 @@ def make_study(command: RobustnessCommand) -> Study:
     def maneuvers(driven: Car) -> Mapping[str, CueSource]:
         return find_maneuvers(names, driven)
 
-    rows = ladder_names(policy_names()) if BENCHMARK in command.policies else []
+    rows = benchmark_policies(policy_names()) if BENCHMARK in command.policies else []
     return Study(
         platform=find_platform(command.platform),
         car=find_car(command.car),

@@ -61,6 +61,10 @@ class ServeCommand:
     """How long cues must have come without a gap before the policy begins, s."""
     fade: float = 1.0
     """Time in which the cues come in then, s."""
+    max_force: float = 1000.0
+    """Largest plausible specific force on an axis, m/s^2; packets beyond it are not used."""
+    max_angular_velocity: float = 100.0
+    """Largest plausible angular velocity about an axis, rad/s."""
     lead: float = 0.001
     """Time before its first set-point at which a step of 10 ms is decided, s; at most a period."""
     cpu: Whole | None = None
@@ -122,16 +126,17 @@ def _check(command: ServeCommand) -> None:
 
 def _made(command: ServeCommand) -> _Served:
     from ..realtime.controller import Controller, ControllerOptions
-    from ..realtime.inbox import Inbox
+    from ..realtime.inbox import CueBounds, Inbox
     from ..realtime.machine import make_machine
     from ..realtime.packets import make_format
     from ..realtime.server import address_of
-    from ..realtime.watchdog import Patience
+    from ..realtime.watchdog import WatchdogOptions
 
-    patience = Patience(command.overdue, command.hold, command.stale, command.steady, command.fade)
-    options = ControllerOptions(rate=command.rate, patience=patience)
+    watchdog = WatchdogOptions(command.overdue, command.hold, command.stale, command.steady, command.fade)
+    options = ControllerOptions(rate=command.rate, watchdog=watchdog)
     peer = address_of(command.peer, 0) if command.peer else None
-    inbox = Inbox(make_format(command.format), patience.stale, patience.overdue, peer)
+    bounds = CueBounds(command.max_force, command.max_angular_velocity)
+    inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)
     platform = arguments.find_platform(command.platform)
     policy = arguments.make_policy(command.policy, platform)
     machine = make_machine(policy, platform, _VESTIBULAR)
@@ -163,8 +168,8 @@ def _terminated_gently() -> Iterator[None]:
 
 
 def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
+    from ..envs.interrupt import Interrupt
     from ..realtime.timing import undisturbed
-    from ..train.training import Interrupt
 
     interrupt, limit = Interrupt(), command.duration
     with interrupt.caught(), _terminated_gently(), undisturbed(command.cpu, command.priority):
@@ -178,10 +183,10 @@ def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
 
 def _finish(command: ServeCommand, served: _Served, server: Server, endpoint: Endpoint) -> None:
     """Write the log and the report, and say what happened."""
-    from ..realtime.report import tell
+    from ..realtime.report import show
 
     report = _report(command, served.controller, server, endpoint)
-    tell(report, "steps of 10 ms", command.report)
+    show(report, "steps of 10 ms", command.report)
     log = served.controller.log
     if command.log is not None and len(log) < 2:
         print(f"--log {command.log} is not written: it ended within the first steps", file=sys.stderr)

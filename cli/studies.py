@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
 from ..evaluation.metrics import Criteria
-from ..evaluation.provenance import head_of
+from ..evaluation.reporting.figures import png
 from ..evaluation.reporting.text import save_markdown, table_console
 from ..evaluation.studies.results import (
     StudyResults,
     common_maneuvers,
     matrix_table,
     print_study,
-    share_tables,
+    score_tables,
     summarize,
 )
 from ..evaluation.studies.store import check_kept, forget_kept
@@ -42,7 +44,7 @@ def run_and_save(
     words: Sequence[str],
     title: str,
     ratios: bool,
-    figure: Callable[[StudyResults], bytes | None],
+    figure: Callable[[StudyResults], Figure | None],
 ) -> int:
     """Drive a study, print its tables, write its files.
 
@@ -63,9 +65,9 @@ def run_and_save(
         outcome = run_study(conditions, policies, out, advance)
     results = results_of(conditions, list(policies), outcome, words)
     _write(results, out, title, ratios)
-    image = figure(results)
-    if image is not None:
-        write_bytes(out / "study.png", image)
+    drawn = figure(results)
+    if drawn is not None:
+        write_bytes(out / "study.png", png(drawn))
     console = table_console()
     print_study(console, results, title, ratios)
     console.print(
@@ -80,8 +82,8 @@ def _write(results: StudyResults, out: Path, title: str, ratios: bool) -> None:
     """What stays of a study, but its figure."""
     results.save_json(out / "study.json")
     results.save_csv(out / "study.csv")
-    left_out = [f"Left out: {line}" for line in results.told_left_out()]
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *share_tables(results), *left_out)
+    skipped = [f"Skipped: {line}" for line in results.skipped_lines()]
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *skipped)
 
 
 def results_of(
@@ -90,14 +92,14 @@ def results_of(
     """The results of an outcome, with what made them."""
     criteria = Criteria()
     return StudyResults(
-        **head_of(StudyResults, words),
+        **StudyResults.head(words),
         conditions={condition.name: condition.description for condition in conditions},
         policies=tuple(policies),
         maneuvers=common_maneuvers(outcome.metrics),
         summaries=summarize(outcome.metrics, criteria),
-        left_out=outcome.left_out,
+        skipped=outcome.skipped,
         failures=tuple(outcome.failures),
         metrics=outcome.metrics,
-        notes=outcome.notes,
+        notes=outcome.statistics,
         criteria=criteria,
     )

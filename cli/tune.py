@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.errors import ConfigurationError, DataError
 from ..envs.progress import Bars
 from ..envs.storage import check_file, write_text
 from .arguments import (
@@ -86,10 +86,10 @@ def run(command: TuneCommand) -> int:
     Raises:
         MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
     """
-    from ..baselines.washout.families import ALGORITHMS
-    from ..train.training import Interrupt
+    from ..baselines.washout.families import FAMILIES
+    from ..envs.interrupt import Interrupt
 
-    look_up("algorithm", command.algorithm, ALGORITHMS)
+    FAMILIES[command.algorithm]  # refuses an unknown one
     command = replace(command, out=_out(command))
     _check(command)
     goes_on = _kept(command).exists() and not command.fresh
@@ -133,9 +133,9 @@ class Telling:
 
 
 def _out(command: TuneCommand) -> Path:
-    from ..baselines.washout.families import ALGORITHMS
+    from ..baselines.washout.families import FAMILIES
 
-    return command.out or Path(f"my-{ALGORITHMS[command.algorithm].start}.yaml")
+    return command.out or Path(f"my-{FAMILIES[command.algorithm].start}.yaml")
 
 
 def _check(command: TuneCommand) -> None:
@@ -164,7 +164,7 @@ def _kept(command: TuneCommand) -> Path:
 def _new(command: TuneCommand) -> Record:
     """The empty record of a new search."""
     from ..baselines.tuning.search import Record
-    from ..train.provenance import command_line
+    from ..envs.provenance import command_line
 
     return Record(_options(command), command.platform, command.car, "", command=command_line())
 
@@ -197,11 +197,11 @@ def _begun(command: TuneCommand) -> Record:
 
 def _options(command: TuneCommand) -> TuningOptions:
     from ..baselines.tuning.search import TuningOptions
-    from ..baselines.washout.families import ALGORITHMS, load_of
+    from ..baselines.washout.families import FAMILIES, load_of
 
     given: dict[str, Any] = {"drives": command.drives, "budget": command.hours, "seed": command.seed}
     return TuningOptions(
-        start=load_of(command.algorithm, command.start or ALGORITHMS[command.algorithm].start),
+        start=load_of(command.algorithm, command.start or FAMILIES[command.algorithm].start),
         objective=command.objective,
         method=command.method,
         limits=command.limits,
@@ -252,8 +252,8 @@ def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
     """The policy, with what is known about it on top."""
     import yaml
 
+    from ..envs.provenance import commit, hardware, now, versions
     from ..envs.settings import to_dict
-    from ..train.provenance import commit, hardware, now, versions
 
     options = search.options
     how = "CMA-ES" if options.method == "cma" else "gradient descent"
@@ -292,7 +292,7 @@ def _held_out(search: Search) -> Objective:
 
 
 def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
-    found = objective.judge([start, tuned])
+    found = objective.evaluate([start, tuned])
     return [
         f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "
         f"{100.0 * found.at_limit[i]:.3f} % of the time at a limit, "
