@@ -71,7 +71,7 @@ constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject
 		--output-file constraints.txt pyproject.toml
 
 clean: ## Remove results and caches
-	rm -rf $(OUT) build dist *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(OUT) build dist *.egg-info .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache docs/tutorials/*.ipynb
 
 distclean: clean ## The same, and the virtual environment
 	rm -rf $(VENV)

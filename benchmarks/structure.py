@@ -1,7 +1,7 @@
 """What structure and horizon are worth to the gradient through the machine: short trainings, some seeds each.
 
 Run it with `python -m benchmarks.structure --out runs/structure`; a training of it that was stopped goes on.
-docs/training.md has what it found.
+docs/notes/training.md has what it found.
 """
 
 from __future__ import annotations

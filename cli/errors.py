@@ -28,7 +28,6 @@ _GOES_ON: Final = "--resume is not needed now: a command goes on from what is in
 OLD_FLAGS: Final[Mapping[str, Mapping[str, str]]] = {
     "evaluate": {"--paper": "--paper is a command of its own now: motion-cueing paper"},
     "train": {
-        "--algo": "--algo is called --algorithm now",
         "--search": "--search is a command of its own now: motion-cueing search --trials N",
         "--population": "--population is a command of its own now: motion-cueing population --members N",
     },

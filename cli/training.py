@@ -24,7 +24,7 @@ _HELD: Final = {"algorithm": "algo", "seed": "seed", "envs": "n_envs", "initial"
 class TrainingOptions:
     """Options of every command that trains."""
 
-    algorithm: Annotated[str | None, option("NAME")] = None
+    algorithm: Annotated[str | None, option("NAME", alias="--algo")] = None
     """Algorithm, of those that `motion-cueing list` names; the other options change its default
     configuration."""
     config: Annotated[Path | None, option("FILE.yaml|NAME")] = None
