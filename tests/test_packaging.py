@@ -97,7 +97,7 @@ def test_the_command_works_where_only_the_wheel_is(installed, tmp_path):
 
 
 def test_the_command_evaluates_where_only_the_wheel_is(installed, tmp_path):
-    words = ("evaluate", "--maneuver", "lane-change", "--policy", "no-motion", "--out", "out")
+    words = ("evaluate", "--maneuvers", "lane-change", "--policies", "no-motion", "--out", "out")
     assert "lane-change" in run(installed / "motion-cueing", *words, cwd=tmp_path)
     assert (tmp_path / "out" / "report.html").is_file()
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -194,7 +194,7 @@ def undeclared(path: Path, text: str, declared: dict[str, set[str]]) -> list[str
 
 def test_every_import_belongs_to_a_declared_dependency(wheel):
     declared = requirements(wheel)
-    assert declared.keys() == {"", "dev", "export", "loop", "optimal", "ray", "render", "train"}
+    assert declared.keys() == {"", "dev", "docs", "export", "loop", "optimal", "ray", "render", "train"}
     sources = [path for path in package_files() if path.suffix == ".py"]
     found = [
         line for path in sources for line in undeclared(path, (ROOT / path).read_text("utf-8"), declared)

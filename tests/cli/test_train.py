@@ -169,7 +169,6 @@ def complaint(words: list[str], capsys) -> str:
         (["train", "--algorithm", "ppo", "--config", "drive.yaml"], "task.episode.drives names braking"),
         (["train", "--algorithm", "td3", "--config", "together.yaml"], "hyperparameters: "),
         (["train", "--algorithm", "ppo", "--out", "."], "there is something already that no training wrote"),
-        (["train", "--algo", "ppo"], "--algo is called --algorithm now."),
         (
             ["train", "--resume", "nowhere"],
             "--resume is not needed now: a command goes on",
