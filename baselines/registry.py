@@ -215,6 +215,12 @@ def _description(path: Path) -> str:
     return str(yaml.safe_load("\n".join(lines[:3])).get("description", ""))
 
 
+def register_presets(folder: Path) -> None:
+    """Give the parameter sets of a washout family, a YAML file each, the names of their files."""
+    for name in preset_names(folder):
+        register(name, partial(_washout, name), _description(folder / f"{name}.yaml"))
+
+
 def _register_own() -> None:
     register("no-motion", _no_motion, "the machine stands still")
     register(
@@ -235,9 +241,7 @@ def _register_own() -> None:
     )
     register("optimum-perceived", partial(_optimum, "perceived"), "the same for the least perceived J")
     for family in ("classical", "adaptive", "optimal"):
-        folder = Path(__file__).parent / "washout" / family / "presets"
-        for name in preset_names(folder):
-            register(name, partial(_washout, name), _description(folder / f"{name}.yaml"))
+        register_presets(Path(__file__).parent / "washout" / family / "presets")
     for ending in ("yaml", "yml"):
         POLICY_FILES.register(ending, _from_yaml, "a washout or a predictive controller")
 

@@ -251,7 +251,10 @@ def _stem(kind: str, name: str, known: Iterable[str]) -> str:
     if is_file(name):
         file = Path(_existing(kind, name)).name
         return file.removesuffix(".gz").removesuffix(".csv") if kind == "maneuver" else Path(file).stem
-    raise UnknownNameError(kind, name, known, {"ladder": BENCHMARK} if kind == "policy" else None)
+    from ..baselines.registry import POLICIES
+
+    renamed = {**POLICIES.renamed, "ladder": BENCHMARK} if kind == "policy" else None
+    raise UnknownNameError(kind, name, known, renamed)
 
 
 def _existing(kind: str, name: str) -> str:

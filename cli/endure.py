@@ -173,7 +173,7 @@ def _print(command: EndureCommand, results: EnduranceResults, found: EnduranceOu
         print_table(console, table)
     if found.skipped:
         told = how_many(len(found.skipped), "drive")
-        console.print(f"{told} left out: the car left the range of its model", highlight=False)
+        console.print(f"{told} skipped: the car left the range of its model", highlight=False)
     state = "" if found.finished else "interrupted, the same command goes on; "
     console.print(
         f"{state}{how_many(found.driven, 'drive')} driven now; everything is in {command.out}",

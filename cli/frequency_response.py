@@ -78,7 +78,7 @@ def run(command: FrequencyResponseCommand) -> int:
     for response in measured.responses:
         print_table(console, response_table(response))
     for policy, reason in measured.skipped.items():
-        console.print(f"[bold]left out[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
+        console.print(f"[bold]skipped[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
     for policy, reason in measured.failed.items():
         console.print(f"[bold red]failed[/bold red] {escape(policy)}: {escape(reason)}", highlight=False)
     if measured.responses:

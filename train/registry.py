@@ -98,7 +98,7 @@ class Learner(ABC):
         """
 
 
-ALGORITHMS: Final = Registry[type[Learner]]("algorithm", "motion_cueing.algorithms")
+ALGORITHMS: Final = Registry[type[Learner]]("algorithm", "motion_cueing.algorithms", extra="train")
 """Algorithms that ``--algorithm`` takes; their modules are imported when they are asked for."""
 
 _SHIPPED: Final = "motion_cueing.train.algorithms"

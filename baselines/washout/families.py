@@ -24,6 +24,7 @@ from ...envs.errors import ConfigurationError, UnknownNameError
 from ...envs.registry import Registry
 from ...envs.settings import Vector2, Vector3, configuration, from_dict, load, read_yaml
 from ..presets import named, preset_names
+from ..registry import register_presets
 from .kernels.launch import Kernels
 
 
@@ -124,10 +125,12 @@ def register_family(name: str, family: Family | str, description: str = "") -> N
 
     Args:
         name: ``Family.name``.
-        family: The family, or ``"module:attribute"`` where to find it.
+        family: The family, whose presets become policies by name; or ``"module:attribute"`` where to find it.
         description: One line for lists.
     """
     FAMILIES.register(name, family, description)
+    if isinstance(family, Family):
+        register_presets(family.presets)
 
 
 register_family("classical", f"{__package__}.classical.family:FAMILY", "the classical washout")

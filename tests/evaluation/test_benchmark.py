@@ -9,7 +9,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.cli.arguments import find_platform, find_policies
+from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.evaluation.benchmark import (
     BENCHMARK,
     BENCHMARK_POLICIES,
@@ -23,7 +24,6 @@ from motion_cueing.evaluation.metrics import METRICS, Criteria, References
 from motion_cueing.evaluation.policies import policy_names
 from motion_cueing.evaluation.reporting.tables import maneuver_table, score_table, suite_table
 from motion_cueing.evaluation.results import Failure, Results
-from motion_cueing.evaluation.selection import find_platform, find_policies
 
 from .examples import GAINS, ORIGIN, results_of
 
@@ -103,7 +103,7 @@ def test_benchmark_stands_for_its_policies_among_others():
         *benchmark_policies(policy_names()),
         "brk",
     ]
-    with pytest.raises(ConfigurationError, match="it is called 'benchmark' now"):
+    with pytest.raises(UnknownNameError, match="it is called 'benchmark' now"):
         find_policies(["ladder"], platform)
 
 

@@ -118,7 +118,7 @@ def test_a_washout_file_under_the_agent_is_kept_in_the_configuration(tmp_path):
         ({"normalize": {"obs": True}}, "unknown field 'normalize.obs'"),
         ({"task": {"action": {"repeat": 0}}}, "'task.action.repeat'"),
         ({"validation": {"best": "speed"}}, "'validation.best'"),
-        ({"algo": "sac"}, "it is for algo sac, but --algo is ppo"),
+        ({"algo": "sac"}, "it is for algo sac, but --algorithm is ppo"),
         ({"search": {"steps": {"low": 3}}}, "give either choices, or low and high"),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_file_that_is_no_configuration_is_refused(text, tmp_path):
 def test_an_unknown_algorithm_is_told_with_the_near_ones():
     with pytest.raises(UnknownNameError, match=r"unknown algorithm 'pp'\. Did you mean ppo"):
         load_config("pp")
-    with pytest.raises(ConfigurationError, match="--algo is missing; use one of ppo"):
+    with pytest.raises(ConfigurationError, match="--algorithm is missing; use one of ppo"):
         load_config(None)
 
 
