@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motion_cueing.baselines import ClassicalWashout, NoMotion, Policy
+from motion_cueing.baselines import ClassicalWashout, NoMotion
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.simulator.kernels.observation import read
 from motion_cueing.evaluation import measure, rollout
@@ -43,7 +43,6 @@ def cue_errors(maneuver: str) -> dict[str, float]:
     """The cue error J of each policy, by name."""
     cues = get_maneuver(maneuver).drive()
     policies: tuple[Any, ...] = (NoMotion(), ClassicalWashout(), CarriageOnSprings())
-    assert all(isinstance(policy, Policy) for policy in policies)
     return {policy.name: measure(rollout(policy, cues)).cue_error for policy in policies}
 
 
