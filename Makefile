@@ -20,7 +20,7 @@ DOCS := $(VENV)/.installed-docs
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help evaluate paper test lint types unit format bench docs docs-serve constraints clean distclean
+.PHONY: help evaluate paper test test-fast coverage lint types unit format bench docs docs-serve constraints clean distclean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,6 +48,12 @@ types: $(DEV) $(TYPES)/motion_cueing ## mypy, strict; with Python 3.11 or newer
 # Workers that meet a cold cache each compile into a folder of their own; Warp keeps the first.
 unit: $(DEV) ## The tests alone
 	$(BIN)/pytest -n $(WORKERS)
+
+test-fast: $(DEV) ## The tests that take no seconds each, for work in between
+	$(BIN)/pytest -n $(WORKERS) -m "not slow"
+
+coverage: $(DEV) ## Branch coverage by package, measured over all tests
+	$(BIN)/pytest -n $(WORKERS) --cov --cov-report=term:skip-covered
 
 format: $(DEV) ## Format the code and mend what ruff can mend
 	$(BIN)/ruff check --fix .
