@@ -42,12 +42,7 @@ class CurvesCommand:
 
 
 def run(command: CurvesCommand) -> int:
-    """Draw, and print where each training ended.
-
-    Raises:
-        ConfigurationError: no folder, another kind of picture, or a scalar that no log has.
-        DataError: a log is missing or broken.
-    """
+    """Draw, and print where each training ended."""
     from ..evaluation.reporting.figures import styled
 
     if command.out.suffix not in _SUFFIXES:

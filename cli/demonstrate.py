@@ -57,11 +57,7 @@ class DemonstrateCommand:
 
 
 def run(command: DemonstrateCommand) -> int:
-    """Record what is not there yet.
-
-    Raises:
-        MotionCueingError: an argument is wrong, or the folder holds another recording.
-    """
+    """Record what is not there yet."""
     from ..evaluation.demonstrations import Demonstrator
 
     check_folder("--out", command.out)

@@ -68,11 +68,7 @@ class EndureCommand:
 
 
 def run(command: EndureCommand) -> int:
-    """Drive what is not done yet, print and write what came of it all.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Drive what is not done yet, print and write what came of it all."""
     from ..evaluation.endurance.run import EnduranceRun
 
     asked = _asked(command)

@@ -111,22 +111,14 @@ class _Output:
 
 
 def run(command: EvaluateCommand) -> int:
-    """Evaluate; the exit status is 1 if a drive failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Evaluate; the exit status is 1 if a drive failed."""
     from ..evaluation.reporting.text import words_of
 
     return report(make_plan(command, words_of("evaluate", command)), BENCHMARK in command.policies)
 
 
 def run_benchmark(command: BenchmarkCommand) -> int:
-    """Evaluate the benchmark; the exit status is 1 if a drive failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Evaluate the benchmark; the exit status is 1 if a drive failed."""
     from ..evaluation.reporting.text import words_of
 
     plan = make_plan(EvaluateCommand(**vars(command)), words_of("benchmark", command))
@@ -134,11 +126,7 @@ def run_benchmark(command: BenchmarkCommand) -> int:
 
 
 def run_paper(command: PaperCommand) -> int:
-    """Reproduce the paper; the exit status is 1 if a number fails.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Reproduce the paper; the exit status is 1 if a number fails."""
     check_folder("--out", command.out)
     check_own_json("--out", command.out / "paper.json", frozenset({"schema", "checks"}))
     from ..evaluation.paper.cases import run as reproduce

@@ -28,11 +28,7 @@ class ExportCommand:
 
 
 def run(command: ExportCommand) -> int:
-    """Export, and print what was found.
-
-    Raises:
-        MotionCueingError: an argument is wrong, a package is missing, or the network computes something else.
-    """
+    """Export, and print what was found."""
     if command.out.suffix != ".onnx":
         raise ConfigurationError(f"--out {command.out}: name a file that ends in .onnx")
     check_file("--out", command.out)

@@ -61,11 +61,7 @@ class Measured:
 
 
 def run(command: FrequencyResponseCommand) -> int:
-    """Measure, print and write; the exit status is 1 if a policy's test failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Measure, print and write; the exit status is 1 if a policy's test failed."""
     from rich.markup import escape
 
     from ..evaluation.frequency_response.reporting import response_table

@@ -52,11 +52,7 @@ class ImportCommand:
 
 
 def run(command: ImportCommand) -> int:
-    """Convert, write, and print the findings.
-
-    Raises:
-        MotionCueingError: the log or an argument is wrong.
-    """
+    """Convert, write, and print the findings."""
     if command.decimals is not None and not 0 <= command.decimals <= _MOST_DECIMALS:
         raise ConfigurationError(f"decimals is {command.decimals}; use 0 to {_MOST_DECIMALS}")
     if command.out.resolve() == command.file.resolve():

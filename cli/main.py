@@ -1,7 +1,8 @@
 """The command line ``motion-cueing``: its commands, their help, exit status, and one line for what is wrong.
 
-A command is a dataclass of its arguments and a function. Modules of commands import libraries within
-functions, so that help and complaints come at once.
+A command is a dataclass of its arguments and a function, which returns the exit status and raises a
+``MotionCueingError`` where an argument or a file is wrong, before anything is driven or written. Modules of
+commands import libraries within functions, so that help and complaints come at once.
 """
 
 from __future__ import annotations

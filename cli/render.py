@@ -45,11 +45,7 @@ class RenderCommand:
 
 
 def run(command: RenderCommand) -> int:
-    """Drive, draw and write.
-
-    Raises:
-        MotionCueingError: an argument is wrong, or a package that draws is missing.
-    """
+    """Drive, draw and write."""
     from ..envs.rendering import FRAMES_PER_SECOND, Renderer
     from ..evaluation.reporting.film import check_suffix, film_frames, gif_rate, save_film
 

@@ -128,11 +128,7 @@ class _Served:
 
 
 def run(command: ServeCommand) -> int:
-    """Serve until it is stopped.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Serve until it is stopped."""
     _check(command)
     print(
         f"making {command.policy} for {command.platform}; it takes some seconds", file=sys.stderr, flush=True
@@ -251,11 +247,7 @@ def _report(command: ServeCommand, controller: Controller, server: Server, endpo
 
 
 def run_drive(command: DriveCommand) -> int:
-    """Drive; the exit status is 1 if nothing came back, or something outside of the limits.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Drive; the exit status is 1 if nothing came back, or something outside of the limits."""
     from ..envs.interrupt import Interrupt
     from ..realtime.client import Client, NetworkFaults, cues_at
     from ..realtime.packets import make_format

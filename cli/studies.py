@@ -87,11 +87,7 @@ class RobustnessCommand:
 
 
 def run_compare(command: CompareCommand) -> int:
-    """Compare; the exit status is 1 if a drive failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Compare; the exit status is 1 if a drive failed."""
     from ..evaluation.policies import make_policy
     from ..evaluation.reporting.text import words_of
     from ..evaluation.studies.figures import lines_figure
@@ -125,11 +121,7 @@ def run_compare(command: CompareCommand) -> int:
 
 
 def run_robustness(command: RobustnessCommand) -> int:
-    """Drive everything; the exit status is 1 if a drive failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Drive everything; the exit status is 1 if a drive failed."""
     from ..evaluation.reporting.text import words_of
     from ..evaluation.studies.figures import heat_figure
 
@@ -185,7 +177,7 @@ def prepare(out: Path, fresh: bool) -> None:
     Raises:
         DataError: ``out`` cannot be written, holds another's study.json, or drives that are damaged.
     """
-    from ..evaluation.studies.store import check_kept, forget_kept
+    from ..evaluation.studies.study import check_kept, forget_kept
 
     check_folder("--out", out)
     check_own_json("--out", out / "study.json", frozenset({"schema", "conditions"}))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -94,11 +93,7 @@ class PopulationCommand(TrainingOptions):
 
 
 def run(command: TrainCommand) -> int:
-    """Train.
-
-    Raises:
-        MotionCueingError: an argument, a file or a hyperparameter is wrong, or a package is missing.
-    """
+    """Train."""
     from ..train.experiments import seeds as studies
 
     check(command)
@@ -113,8 +108,7 @@ def run(command: TrainCommand) -> int:
 
 
 def _train(command: TrainCommand) -> int:
-    from ..train.experiments.seeds import report_training
-    from ..train.progress import TrainingProgress
+    from ..train.experiments.seeds import TrainingProgress, report_training
     from ..train.training import Training
 
     folder = _folder(command)
@@ -161,11 +155,7 @@ def _seeds(command: TrainCommand) -> Seeds:
 
 
 def run_search(command: SearchCommand) -> int:
-    """Search.
-
-    Raises:
-        MotionCueingError: an argument, a file or a hyperparameter is wrong, or a package is missing.
-    """
+    """Search."""
     from ..train.experiments.search import Search
     from ..train.experiments.seeds import run_search as search_with
 
@@ -184,11 +174,7 @@ def run_search(command: SearchCommand) -> int:
 
 
 def run_population(command: PopulationCommand) -> int:
-    """Train.
-
-    Raises:
-        MotionCueingError: an argument, a file or a hyperparameter is wrong, or a package is missing.
-    """
+    """Train."""
     from ..train.experiments.population import Population
     from ..train.experiments.seeds import run_population as train_with
 
@@ -276,7 +262,9 @@ def goes_on(command: TrainingOptions, kind: str) -> bool:
     out = command.out
     if out is None or not out.is_dir() or not any(out.iterdir()):
         return False
-    found = _kind_of(out)
+    from ..train.experiments.seeds import kind_of
+
+    found = kind_of(out)
     if found is None:
         raise DataError(
             f"--out {out}: there is something already that no training wrote; name another folder"
@@ -296,21 +284,6 @@ _COMMAND: Final = {
     "search": "`motion-cueing search`",
     "population": "`motion-cueing population`",
 }
-
-
-def _kind_of(folder: Path) -> str | None:
-    """What was begun in a folder; None where nothing was."""
-    from ..train.experiments.population import is_population
-    from ..train.experiments.search import is_search
-    from ..train.experiments.seeds import is_seeds
-
-    kinds: dict[str, Callable[[Path], bool]] = {
-        "search": is_search,
-        "seeds": is_seeds,
-        "population": is_population,
-        "training": lambda path: (path / "config.yaml").exists(),
-    }
-    return next((kind for kind, holds in kinds.items() if holds(folder)), None)
 
 
 def check_same(command: TrainingOptions, begun: TrainingConfig) -> None:

@@ -81,11 +81,7 @@ class TuneCommand:
 
 
 def run(command: TuneCommand) -> int:
-    """Search, and write what was found.
-
-    Raises:
-        MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
-    """
+    """Search, and write what was found."""
     from ..baselines.washout.families import FAMILIES
     from ..envs.interrupt import Interrupt
 

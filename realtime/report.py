@@ -10,7 +10,7 @@ from typing import Final
 from ..envs.provenance import hardware
 from ..envs.settings import configuration
 from ..evaluation.reporting.text import NOTHING, TextTable, print_table, table_console
-from ..evaluation.saved import Headed
+from ..evaluation.results import Headed
 from .client import Client
 from .server import Server
 from .timing import QUANTILES, TimingSummary

@@ -11,7 +11,7 @@ import io
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -106,27 +106,6 @@ _RECORD: Final = "run.json"
 _DEFAULT_PARENT: Final = Path("runs")
 
 
-@dataclass(frozen=True)
-class Session:
-    """One start of a training, the first or one that resumes.
-
-    Args:
-        command: The command line.
-        begun: When, ISO 8601.
-        steps: Actions there were already.
-        versions: Of this package and the libraries.
-        hardware: What it runs on.
-        commit: Of the sources, if they are in git.
-    """
-
-    command: str
-    begun: str
-    steps: int
-    versions: dict[str, str] = field(default_factory=provenance.versions)
-    hardware: str = ""
-    commit: str | None = field(default_factory=provenance.commit)
-
-
 class RunFolder:
     """A training's folder.
 
@@ -194,9 +173,15 @@ class RunFolder:
         """Note a start: configuration, command, versions, hardware, commit."""
         self.checkpoints.mkdir(parents=True, exist_ok=True)
         save(self.config, self.path / _CONFIG)
-        hardware = provenance.hardware(self.config.device)
-        session = Session(provenance.command_line(), provenance.now(), steps, hardware=hardware)
-        self.sessions.append(asdict(session))
+        session = {
+            "command": provenance.command_line(),
+            "begun": provenance.now(),
+            "steps": steps,
+            "versions": provenance.versions(),
+            "hardware": provenance.hardware(self.config.device),
+            "commit": provenance.commit(),
+        }
+        self.sessions.append(session)
         record = {"algo": self.config.algo, "seed": self.config.seed, "sessions": self.sessions}
         write_text(self.path / _RECORD, json.dumps(record, indent=2) + "\n")
 

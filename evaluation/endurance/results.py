@@ -27,8 +27,7 @@ from ...envs.storage import write_text
 from ...envs.task import RandomizationOptions, TaskOptions
 from ...envs.task.drives import machines_of
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
-from ..results import save_rows
-from ..saved import Headed
+from ..results import Headed, save_rows
 
 NOMINAL: Final = "nominal"
 """Name of the condition with the machine as it should be."""

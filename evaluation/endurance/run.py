@@ -24,7 +24,7 @@ from ...envs.simulator.simulator import TIME_STEP
 from ...envs.task.drives import slippery
 from ..policies import make_policy
 from ..rollout import Rollout
-from ..studies.store import identity
+from ..studies.study import identity
 from .checks import drive_and_check
 from .results import (
     NOMINAL,

@@ -18,8 +18,7 @@ from ...envs.settings import configuration
 from ..metrics import CUE_AXES, Criteria
 from ..reporting.figures import CAR, line_styles, new_figure, png, styled
 from ..reporting.text import NOTHING, TextTable, number
-from ..results import save_rows
-from ..saved import Saved
+from ..results import Saved, save_rows
 from .response import FrequencyResponse
 
 SCHEMA: Final = 1

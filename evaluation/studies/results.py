@@ -18,8 +18,7 @@ from ..comparison import normalized_scores
 from ..metrics import METRICS, Criteria, Metrics, over_drives
 from ..reporting.tables import SCORES, Cell, policy_table
 from ..reporting.text import NOTHING, TextTable, fraction, how_many, number, percent, print_table
-from ..results import save_frame
-from ..saved import Headed
+from ..results import Headed, save_frame
 from ..suite import print_troubles
 
 SCHEMA: Final = 2

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
-from motion_cueing.baselines.washout import families as ceiling
-from motion_cueing.baselines.washout.families import load_ceiling
+from motion_cueing.baselines.washout.classical import per_maneuver
 from motion_cueing.cli.main import main
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
@@ -28,7 +27,7 @@ from motion_cueing.train.algorithms.dagger.demonstrations import (
     load_index,
 )
 
-from ..optimum.drives import surge
+from ..baselines.optimum.drives import surge
 
 WASHOUT = ("--policy", "classical")
 
@@ -137,11 +136,11 @@ def test_a_car_whose_file_has_changed_is_refused(folder, tmp_path, capsys):
     assert "holds drives of another controller, car" in capsys.readouterr().err
 
 
-def test_a_ceiling_of_other_sets_is_refused(folder, monkeypatch, capsys):
-    words = ("--policy", "classical-ceiling", "--maneuvers", "sine-with-dwell")
+def test_other_sets_of_the_per_maneuver_washout_are_refused(folder, monkeypatch, capsys):
+    words = ("--policy", "classical-per-maneuver", "--maneuvers", "sine-with-dwell")
     assert record(*words) == 0
-    edited = replace(load_ceiling("sine-with-dwell"), turntable_share=0.25)
-    monkeypatch.setattr(ceiling, "load_ceiling", lambda name: edited)
+    edited = replace(per_maneuver.load_per_maneuver("sine-with-dwell"), turntable_share=0.25)
+    monkeypatch.setattr(per_maneuver, "load_per_maneuver", lambda name: edited)
     assert record(*words) == 2
     assert "holds drives of another controller" in capsys.readouterr().err
 

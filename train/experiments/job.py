@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import platform
 import traceback
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -69,6 +72,13 @@ class TrainingJob:
 
     def _paused(self, status: Status) -> bool:
         return self.until is not None and status.steps >= self.until
+
+
+def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    """Write rows as CSV, whole or not at all."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    write_text(path, text.getvalue())
 
 
 def inherit(run: RunFolder, parent: RunFolder) -> None:

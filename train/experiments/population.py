@@ -9,8 +9,6 @@ stopped goes on to the same bits.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import shutil
@@ -28,24 +26,28 @@ from ..config import Choice, PopulationOptions, TrainingConfig
 from ..run import RunFolder, free_folder
 from ..training import rating
 from .engine import Ending, Engine, Listener, run_jobs
-from .job import TrainingJob
+from .job import TrainingJob, write_table
 from .search import check_space, varied
 
 Values = dict[str, Any]
 """What is varied, by path."""
 
 
-@dataclass(frozen=True)
-class Successor:
-    """How a member of the next generation starts.
+@dataclass
+class Member:
+    """A member in one generation.
 
     Args:
-        parent: The member of this generation whose checkpoint it goes on from.
-        values: What it trains with.
+        values: Its values, by path.
+        parent: Member of the generation before that it goes on from; None in the first.
+        rating: Of its last validation, lower is better; None until it is done.
+        best: Rating of the best agent among its ancestors and itself.
     """
 
-    parent: int
     values: Values
+    parent: int | None = None
+    rating: float | None = None
+    best: float | None = None
 
 
 def draw(space: Mapping[str, Choice], random: np.random.Generator) -> Values:
@@ -59,13 +61,13 @@ def next_generation(
     space: Mapping[str, Choice],
     options: PopulationOptions,
     random: np.random.Generator,
-) -> list[Successor]:
-    """Who goes on from whom.
+) -> list[Member]:
+    """Truncation selection and exploration: the members of the next generation.
 
     Args:
-        ratings: Of each member, lower is better; what is not finite is worst.
+        ratings: Of each member, lower is better; one that is not finite is worst.
         values: Of each member.
-        space: What they may be.
+        space: The choice of each field.
         options: Shares and factors.
         random: Of everything that is drawn.
 
@@ -80,10 +82,10 @@ def next_generation(
     successors = []
     for member, own in enumerate(values):
         if member not in worst:
-            successors.append(Successor(member, dict(own)))
+            successors.append(Member(dict(own), member))
             continue
         parent = int(random.choice(best))
-        successors.append(Successor(parent, explored(values[parent], space, options, random)))
+        successors.append(Member(explored(values[parent], space, options, random), parent))
     return successors
 
 
@@ -133,23 +135,6 @@ _TABLE: Final = "results.csv"
 _ROOTS: Final = ("hyperparameters.", "task.reward.")
 _SHAPES: Final = ("policy", "policy_kwargs", "net_arch", "activation_fn", "buffer_size")
 """Hyperparameters that a checkpoint is made for."""
-
-
-@dataclass
-class Member:
-    """A member in one generation.
-
-    Args:
-        values: What it trains with, by path.
-        parent: Member of the generation before that it goes on from; None in the first.
-        rating: Of its last validation, lower is better; None until it is done.
-        best: Rating of the best agent among its ancestors and itself.
-    """
-
-    values: dict[str, Any]
-    parent: int | None = None
-    rating: float | None = None
-    best: float | None = None
 
 
 class Population:
@@ -278,8 +263,7 @@ class Population:
         ratings = [math.inf if member.rating is None else member.rating for member in latest]
         random = self._random(len(self.generations))
         values = [member.values for member in latest]
-        successors = next_generation(ratings, values, self.config.search, self.options, random)
-        self.generations.append([Member(successor.values, successor.parent) for successor in successors])
+        self.generations.append(next_generation(ratings, values, self.config.search, self.options, random))
         self._save()
 
     def _forget_checkpoints(self, number: int) -> None:
@@ -301,17 +285,14 @@ class Population:
     def _save(self) -> None:
         state = [[asdict(member) for member in members] for members in self.generations]
         write_text(self.path / _STATE, json.dumps(state, indent=1) + "\n")
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
         names = list(self.config.search)
-        table.writerow(["generation", "member", "parent", "rating", "best", *names])
+        rows: list[list[Any]] = [["generation", "member", "parent", "rating", "best", *names]]
         for number, members in enumerate(self.generations, start=1):
             for i, member in enumerate(members):
-                row = [
-                    "" if value is None else value for value in (member.parent, member.rating, member.best)
-                ]
-                table.writerow([number, i, *row, *(member.values[name] for name in names)])
-        write_text(self.path / _TABLE, text.getvalue())
+                # None becomes an empty cell.
+                row = [member.parent, member.rating, member.best]
+                rows.append([number, i, *row, *(member.values[name] for name in names)])
+        write_table(self.path / _TABLE, rows)
 
 
 def is_population(path: Path) -> bool:

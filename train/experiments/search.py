@@ -6,8 +6,6 @@ populations. Its folder holds Optuna's journal, a folder for each trial, a table
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import shutil
 from collections.abc import Callable, Mapping
@@ -23,12 +21,11 @@ from optuna.trial import FrozenTrial, TrialState
 
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.settings import from_dict, load, save, to_dict
-from ...envs.storage import write_text
 from ..config import Choice, TrainingConfig
 from ..run import free_folder
 from ..training import Status, rating
 from .engine import Ending, Engine, Job, Listener
-from .job import TrainingJob
+from .job import TrainingJob, write_table
 
 JOURNAL: Final = "search.journal"
 """File with all trials, beside their folder."""
@@ -66,8 +63,7 @@ def check_space(config: TrainingConfig) -> None:
     """
     if not config.search:
         raise ConfigurationError("search is empty; name fields to vary, as hyperparameters.learning_rate")
-    ends: tuple[Callable[[Choice], Any], ...] = (first, last)
-    for end in ends:
+    for end in (first, last):
         varied(config, {path: end(choice) for path, choice in config.search.items()})
 
 
@@ -185,15 +181,13 @@ class Search:
         """Write the table of all trials, and the configuration of the best."""
         trials = self._study(optuna.load_study).get_trials(deepcopy=False)
         names = list(self.config.search)
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["trial", "state", "result", *names])
+        rows: list[list[Any]] = [["trial", "state", "result", *names]]
         for trial in trials:
             result = "" if trial.value is None else f"{trial.value:.6g}"
             values = self._values(trial.params)
             row = [values.get(name, "") for name in names]
-            table.writerow([trial.number, trial.state.name.lower(), result, *row])
-        write_text(self.path / _TABLE, text.getvalue())
+            rows.append([trial.number, trial.state.name.lower(), result, *row])
+        write_table(self.path / _TABLE, rows)
         best = self.best()
         if best is not None:
             config = self._config_with(self._values(best.params))

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
+from rich.console import Console
+from typing_extensions import Self
 
 from ...envs.errors import DataError
+from ...envs.progress import Bar, Bars
 from ...envs.settings import configuration, load, save
-from ...envs.storage import write_text
 from ...envs.task.options import PositiveCount
 from ..config import TrainingConfig
-from ..progress import TrainingProgress
 from ..run import RunFolder, free_folder, is_training
-from ..training import Outcome
-from .engine import Ending, Engine, Listener, make_engine, run_jobs
-from .job import TrainingJob
+from ..training import Outcome, Status
+from .engine import Ending, Engine, Job, Listener, make_engine, run_jobs
+from .job import TrainingJob, write_table
 from .population import Population, is_population
 from .search import Search, is_search
 
@@ -104,12 +104,8 @@ class Seeds:
         return [result.status.best for result in results if not result.interrupted], interrupted
 
     def _report(self, endings: dict[str, Ending]) -> None:
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["seed", "state", "steps", "best", "last J"])
-        for job in self.jobs:
-            table.writerow([job.config.seed, *_row(endings.get(job.name))])
-        write_text(self.path / _TABLE, text.getvalue())
+        rows = [[job.config.seed, *_row(endings.get(job.name))] for job in self.jobs]
+        write_table(self.path / _TABLE, [["seed", "state", "steps", "best", "last J"], *rows])
 
 
 def is_seeds(path: Path) -> bool:
@@ -136,6 +132,66 @@ def _row(ending: Ending | None) -> list[Any]:
 
 _INTERRUPTED: Final = 130
 _SUCCESS: Final = 0
+
+
+class TrainingProgress:
+    """A bar for each training on a terminal, and a line for each validation anywhere.
+
+    Shows one training (:meth:`tell`), or the jobs of an engine (as its listener).
+
+    Args:
+        total: Actions of one training, to show its bar before its first status.
+        console: Where to write; default: the error stream.
+    """
+
+    def __init__(self, total: int | None = None, console: Console | None = None) -> None:
+        self._all, self._bars = Bars(console), dict[str, Bar]()
+        if total is not None:
+            self._bars["training"] = self._all.add("training", total)
+
+    def __enter__(self) -> Self:
+        """Show bars."""
+        self._all.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove them."""
+        self._all.__exit__(kind, error, trace)
+
+    def tell(self, status: Status) -> None:
+        """Show the progress of the one training."""
+        self._show("training", status, "")
+
+    def update(self, job: Job, status: Status) -> None:
+        """Show the progress of a job."""
+        self._show(job.name, status, f"{job.name}: ")
+
+    def ended(self, job: Job, ending: Ending) -> None:
+        """Remove a job's bar."""
+        if job.name in self._bars:
+            self._bars.pop(job.name).remove()
+
+    def _show(self, name: str, status: Status, before: str) -> None:
+        bar = self._bars.get(name) or self._all.add(name, status.total)
+        self._bars[name] = bar
+        speed = bar.speed
+        bar.move(status.steps, note=f"{speed:,.0f} a second" if speed else "")
+        if status.news:
+            self._all.line(f"{before}{validation_line(status)}")
+
+
+def validation_line(status: Status) -> str:
+    """One line about the last validation."""
+    score = status.score
+    assert score is not None
+    washout = f" (classical washout {status.reference:.2f})" if status.reference is not None else ""
+    return (
+        f"{status.steps:>12,} steps  J {score.cue_error:.2f}{washout}, "
+        f"perceived {score.perceived_error:.2f}, reward {score.reward:.2f}, "
+        f"limited {100.0 * score.limited:.2f} %"
+    )
 
 
 @dataclass(frozen=True)

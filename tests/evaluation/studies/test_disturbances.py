@@ -10,7 +10,7 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.evaluation.rollout import rollout
 from motion_cueing.evaluation.studies import disturbances
 from motion_cueing.evaluation.studies.disturbances import Disturbances, Study, time_scaled
-from motion_cueing.evaluation.studies.store import drive_key
+from motion_cueing.evaluation.studies.study import drive_key
 
 from .bends import PAPER, SEDAN, bend
 

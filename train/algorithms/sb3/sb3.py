@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ....envs.errors import ConfigurationError, suggest
 from ...agents import Network
-from ...agents.base_policy import base_policy
+from ...agents.agent import base_policy
 from ...config import TrainingConfig
 from ...logs import Monitor
 from ...networks import TORCH_ACTIVATIONS
