@@ -44,7 +44,7 @@ class EvaluateCommand:
 class BenchmarkCommand:
     """Evaluate every controller of the benchmark, and rank them over all maneuvers.
 
-    Writes what `motion-cueing evaluate` writes. A controller that cannot drive the motion base is left out.
+    Writes what `motion-cueing evaluate` writes. A controller that cannot drive the motion base is skipped.
     The optimum takes minutes a drive. Policies of your own are driven beside the benchmark with
     `--policies benchmark mine.yaml`.
     """

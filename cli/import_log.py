@@ -1,4 +1,4 @@
-"""``motion-cueing import``: a log of a drive becomes cues, with a picture of what was found."""
+"""``motion-cueing import``: a log of a drive becomes cues, with a picture of the estimates."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ImportCommand:
     """Turn a log of a drive into cues.
 
     Estimates from the record itself how the device sat in the car (gravity, dv/dt against the
-    forward axis, v r against the lateral one, course against yaw rate), and prints what it found.
+    forward axis, v r against the lateral one, course against yaw rate), and prints the findings.
     """
 
     file: Annotated[Path, option("LOG")] = field(kw_only=False)
@@ -88,7 +88,7 @@ def import_plot(imported: ImportedLog) -> bytes:
 
     with styled():
         figure = new_figure(12.0, 11.0)
-        figure.suptitle(f"{imported.trace.name}: what the import found")
+        figure.suptitle(f"{imported.trace.name}: findings of the import")
         _draw(figure, imported)
         return png(figure)
 

@@ -269,7 +269,7 @@ def _dispatch(arguments: list[str]) -> int:
         print(_whole().generate_completion(prog_name=PROGRAM, shell=shell))  # type: ignore[arg-type]
         return SUCCESS
     if name == "__complete":
-        # The script of --print-completion asks for names.
+        # The script of --print-completion calls this to complete names.
         _whole()(arguments, result_action="return_none")
         return SUCCESS
     if name.startswith("-"):
@@ -316,7 +316,7 @@ def parse(name: str, arguments: Sequence[str]) -> Any:
         arguments: Words after it.
 
     Returns:
-        Its dataclass; None where its help was asked for and has been shown.
+        Its dataclass; None where its help was requested and has been shown.
 
     Raises:
         ConfigurationError: an argument is wrong.

@@ -54,7 +54,7 @@ def run(command: RenderCommand) -> int:
         raise ConfigurationError("a png shows one moment, --begin; leave --end and --rate out")
     check_file("--out", command.out)
     size = command.size or (_GIF_SIZE if suffix == ".gif" else _FILM_SIZE)
-    # Made before anything is driven, so that a wrong size or a missing package is told at once.
+    # Made before anything is driven, so that a wrong size or a missing package is reported at once.
     renderer = Renderer(arguments.find_platform(command.platform), size)
     trajectory = drive(command)
     if suffix == ".png":

@@ -185,8 +185,8 @@ def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
     host, port = endpoint.address
     print(f"{command.policy} on {command.platform}: UDP {host}:{port}, {command.rate} set-points a second")
     if not is_loopback(endpoint.address):
-        told = f"only {command.peer} moves it" if command.peer else "whoever sends first moves it; see --peer"
-        print(f"the network reaches {host}:{port}, beyond this machine: {told}")
+        who = f"only {command.peer} moves it" if command.peer else "whoever sends first moves it; see --peer"
+        print(f"the network reaches {host}:{port}, beyond this machine: {who}")
     sys.stdout.flush()
 
 

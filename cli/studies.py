@@ -62,7 +62,7 @@ class RobustnessCommand:
     """Drive policies with slower actuators, dead time, noisy sensors, another car, and in faster drives.
 
     Each policy is made for the machine as it should be and knows nothing of the disturbance. Policies of the
-    benchmark that know the drive beforehand are left out. Without --maneuvers the standard maneuvers are
+    benchmark that know the drive beforehand are skipped. Without --maneuvers the standard maneuvers are
     driven. Drives that are done are kept in the output folder and not driven again.
     """
 
@@ -172,7 +172,7 @@ def make_study(command: RobustnessCommand) -> Study:
 
 
 def prepare(out: Path, fresh: bool) -> None:
-    """Refuse a folder that cannot be used; with ``fresh``, forget the drives that are kept.
+    """Refuse a folder that cannot be used; with ``fresh``, remove the finished drives.
 
     Raises:
         DataError: ``out`` cannot be written, holds another's study.json, or drives that are damaged.

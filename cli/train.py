@@ -224,9 +224,9 @@ def place(command: TrainingOptions) -> Place:
     """
     from ..train.experiments.seeds import Place
 
-    found = Place(command.engine, command.workers, command.address)
-    found.check()
-    return found
+    place = Place(command.engine, command.workers, command.address)
+    place.check()
+    return place
 
 
 def new_config(command: TrainingOptions, **others: Any) -> TrainingConfig:
@@ -264,14 +264,14 @@ def goes_on(command: TrainingOptions, kind: str) -> bool:
         return False
     from ..train.experiments.seeds import kind_of
 
-    found = kind_of(out)
-    if found is None:
+    begun = kind_of(out)
+    if begun is None:
         raise DataError(
             f"--out {out}: there is something already that no training wrote; name another folder"
         )
-    if found != kind:
+    if begun != kind:
         raise DataError(
-            f"--out {out} holds a {found}; {_COMMAND[found]} goes on with it; or name another folder"
+            f"--out {out} holds a {begun}; {_COMMAND[begun]} goes on with it; or name another folder"
         )
     if command.fresh:
         shutil.rmtree(out)

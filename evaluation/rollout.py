@@ -129,7 +129,7 @@ class Rollout:
 
     @property
     def requested(self) -> Floats:
-        """(n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2."""
+        """(n, 9) accelerations requested of the axes in the last time step, m/s^2 and rad/s^2."""
         return self.interface.requested
 
     def steps(self) -> Iterator[float]:
@@ -162,8 +162,8 @@ class Recording:
 
     Args:
         states: (n,) rows of ``Simulator.state``.
-        actions: (n, 9) accelerations asked for in the step that ended at a row.
-        seconds: (n,) wall-clock time of the policy; NaN where it was not asked.
+        actions: (n, 9) accelerations requested in the step that ended at a row.
+        seconds: (n,) wall-clock time of the policy; NaN where it held its last action.
     """
 
     states: NDArray[Any]

@@ -29,7 +29,7 @@ class LoopReport(Headed):
         duration: From the first period to the last, s.
         periods: Number of periods.
         overrun: Periods that were not over when the next should have begun.
-        skipped: Periods left out, since an earlier one took too long.
+        skipped: Skipped periods, since an earlier one took too long.
         packets: Packets received, by kind.
         states: Counts by state: time steps of a controller, set-points received by a client.
         timings: By name, see :mod:`~.server` and :class:`~.client.Client`.
@@ -83,7 +83,7 @@ def report_of(
 
 
 def summary_lines(report: LoopReport, unit: str) -> list[str]:
-    """The counts in words; zeros are left out.
+    """The counts in words; zeros are not shown.
 
     Args:
         report: The report.
@@ -95,7 +95,7 @@ def summary_lines(report: LoopReport, unit: str) -> list[str]:
     states = ", ".join(f"{name} {n}" for name, n in report.states.items() if n)
     lines = [
         f"{report.periods} periods in {report.duration:.1f} s; deadlines missed: {missed} ({percent:.4f} %), "
-        f"{report.overrun} late and {report.skipped} left out",
+        f"{report.overrun} late and {report.skipped} skipped",
         f"packets: {packets or 'none'}",
     ]
     return [*lines, *([f"{unit}: {states}"] if states else []), *report.faults]

@@ -211,8 +211,8 @@ class RunFolder:
         Raises:
             DataError: it is damaged.
         """
-        found = checkpoints_in(self.checkpoints)
-        return read_checkpoint(found[-1]) if found else None
+        checkpoints = checkpoints_in(self.checkpoints)
+        return read_checkpoint(checkpoints[-1]) if checkpoints else None
 
 
 def is_training(path: Path) -> bool:

@@ -166,7 +166,7 @@ class Training:
         self._begun -= state["elapsed"]
         self._seen = self.status.steps = self.learner.steps
         self.status.best, self.status.reference = state["best"], state["reference"]
-        # Checkpoints before this was kept have none.
+        # Checkpoints of early versions have none.
         if state.get("score") is not None:
             self.status.score = Score(**state["score"])
         if state["initial"] is not None:

@@ -20,9 +20,7 @@ from .results import Endured
 
 Floats = NDArray[np.float64]
 
-
-# Whether a machine's true motion keeps its limits, told from the motion alone: the limiter is not asked.
-
+# Limits of the true motion: they are checked on the motion alone, without the limiter.
 
 KINDS: Final = ("position", "rate", "acceleration", "pose", "number")
 """What can be exceeded: an actuator's travel, speed or acceleration; a pose, which its legs must hold and
@@ -62,7 +60,7 @@ class TrueLimits:
             motion: (steps, n) rows of ``envs.platform.kernels.step.Motion``; they follow those of the
             last call.
         """
-        position, rate, told, clearance = self._actuators(motion)
+        position, rate, reported, clearance = self._actuators(motion)
         change = np.diff(np.concatenate([self._before, rate]), axis=0) / self._dt
         # A machine that begins has come from rest.
         change = np.concatenate([np.zeros((len(rate) - len(change), *rate.shape[1:])), change])
@@ -75,7 +73,7 @@ class TrueLimits:
             self.use[name] = float(np.max(share, initial=self.use[name], where=np.isfinite(share)))
         self.clearance = float(np.min(clearance, initial=self.clearance, where=np.isfinite(clearance)))
         exceeded = limits_exceeded(limits, position, rate, change, TOLERANCE)
-        holds = (np.abs(position[..., LEGS] - told) <= TOLERANCE).all(axis=-1) & (clearance > 0.0)
+        holds = (np.abs(position[..., LEGS] - reported) <= TOLERANCE).all(axis=-1) & (clearance > 0.0)
         finite = np.isfinite(position).all(axis=-1) & np.isfinite(rate).all(axis=-1)
         beyond = [np.asarray(flags.any(axis=-1)) for flags in exceeded]
         return dict(zip(KINDS, (*beyond, np.logical_not(holds), np.logical_not(finite)), strict=True))
@@ -84,7 +82,7 @@ class TrueLimits:
         """Positions and rates (steps, n, 9), legs of the step (steps, n, 6), clearance (steps, n)."""
         shape, rows = motion.shape, motion.reshape(-1)
         position, rate = (np.array(rows[name], dtype=np.float64) for name in ("position", "rate"))
-        told = position[:, LEGS].copy()
+        reported = position[:, LEGS].copy()
         pose = np.hstack([rows["displacement"], rows["beta"]]).astype(np.float64)
         pose_rate = np.hstack([rows["velocity"], rows["beta_rate"]]).astype(np.float64)
         # Legs of a pose that is not finite are not a number, and count as such.
@@ -94,7 +92,7 @@ class TrueLimits:
         return (
             position.reshape(*shape, 9),
             rate.reshape(*shape, 9),
-            told.reshape(*shape, 6),
+            reported.reshape(*shape, 6),
             legs.clearance.reshape(shape),
         )
 

@@ -379,7 +379,7 @@ def endurance_key(platform: Platform, endurance: Endurance, policy: Mapping[str,
     Args:
         platform: The machine.
         endurance: Options of the drives.
-        policy: From :func:`~..studies.store.identity`.
+        policy: From :func:`~..studies.study.identity`.
     """
     whole = {
         "version": package_version(),

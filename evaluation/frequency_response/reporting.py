@@ -25,7 +25,7 @@ SCHEMA: Final = 1
 """Version of ``frequency-response.json``."""
 
 CROSSED: Final = (("f_x", "w_y"), ("f_y", "w_x"), ("w_y", "f_x"), ("w_x", "f_y"))
-"""Input and felt axis of the crossed responses that the test asks for: tilt coordination, and its reverse."""
+"""Input axis and simulator axis of the crossed responses of the test: tilt coordination, and its reverse."""
 
 
 def response_table(response: FrequencyResponse) -> TextTable:
@@ -89,7 +89,7 @@ def _flat(response: FrequencyResponse) -> Iterator[Mapping[str, Any]]:
 
 
 def save_csv(responses: Sequence[FrequencyResponse], path: Path) -> None:
-    """Write one row a policy, input axis, felt axis and frequency, in SI units."""
+    """Write one row a policy, input axis, simulator axis and frequency, in SI units."""
     save_rows([row for response in responses for row in _flat(response)], path)
 
 
@@ -188,10 +188,10 @@ def matrix_figure(responses: Sequence[FrequencyResponse], criteria: Criteria | N
                 grid[i, 0].set_ylabel(f"simulator {simulated}")
             grid[0, j].set_title(f"car's {moved}")
             grid[-1, j].set_xlabel("rad/s")
-        felt_at_all = {
+        simulated = {
             r.policy for r in responses for j in r.inputs for i in CUE_AXES if np.any(r.response(j, i))
         }
-        _finish(figure, responses, "Every axis to every input", felt_at_all, _ABOUT_MATRIX)
+        _finish(figure, responses, "Every axis to every input", simulated, _ABOUT_MATRIX)
         return png(figure)
 
 
@@ -275,7 +275,7 @@ def _phase(axes: Axes, responses: Sequence[FrequencyResponse], styles: Styles, a
     axes.axhline(0.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     for response in responses:
         values = response.response(axis, axis)
-        # Where nothing is felt the phase is that of rounding.
+        # Where nothing comes through the phase is that of rounding.
         simulated = np.abs(values) > _LEAST
         phase = np.degrees(np.unwrap(np.angle(values[simulated])))
         line = {"marker": "o", "markersize": 2.5, **styles[response.policy]}

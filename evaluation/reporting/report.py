@@ -43,7 +43,7 @@ def render(results: Results, figures: Mapping[str, bytes], benchmark: bytes | No
 
     Args:
         results: What to report.
-        figures: PNG by maneuver; those missing are left out.
+        figures: PNG by maneuver, as far as there are any.
         benchmark: PNG of the benchmark.
     """
     source = files(__package__).joinpath("report.html").read_text(encoding="utf-8")

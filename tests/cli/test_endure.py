@@ -13,10 +13,10 @@ from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
 from motion_cueing.evaluation.endurance.results import EnduranceResults, Endured, EnduredDrive, summarized
-from motion_cueing.evaluation.endurance.run import Asked, Run, Stopped
+from motion_cueing.evaluation.endurance.run import EnduranceRequest, EnduranceRun, Stopped
 from motion_cueing.evaluation.policies import make_policy
 
-from ..evaluation.studies import PAPER
+from ..evaluation.studies.bends import PAPER
 
 SECONDS = 5.0
 ARGV = ["endure", "--policies", "no-motion", "classical", "--duration", str(SECONDS), "--envs", "2"]
@@ -89,7 +89,9 @@ def test_a_single_drive_can_be_looked_into(tmp_path, capsys):
 
 
 def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
-    asked = Asked(Endurance(duration=2.0), PAPER, {"classical": "classical"}, drive_seeds(4, 0), 2, tmp_path)
+    request = EnduranceRequest(
+        Endurance(duration=2.0), PAPER, {"classical": "classical"}, drive_seeds(4, 0), 2, tmp_path
+    )
     done = []
 
     def tell(what, seconds):
@@ -97,21 +99,21 @@ def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
         if sum(done) > 4 * 2.0:
             raise Stopped
 
-    found = Run(asked).drive(tell)
+    found = EnduranceRun(request).drive(tell)
     assert not found.finished
     assert found.driven == len(found.policies["classical"].drives) == 2
-    again = Run(asked)
+    again = EnduranceRun(request)
     assert again.seconds == 2 * 2 * 2.0
     found = again.drive(lambda what, seconds: None)
     assert found.finished
     assert (found.driven, len(found.policies["classical"].drives)) == (2, 4)
     # Another way of driving is another key: nothing of this is taken.
-    other = Asked(Endurance(duration=3.0), PAPER, asked.policies, asked.seeds, 2, tmp_path)
-    assert Run(other).seconds == 4 * 2 * 3.0
+    other = EnduranceRequest(Endurance(duration=3.0), PAPER, request.policies, request.seeds, 2, tmp_path)
+    assert EnduranceRun(other).seconds == 4 * 2 * 3.0
 
 
 def test_ctrl_c_ends_it_with_what_was_driven(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("motion_cueing.train.training.Interrupt.asked", True, raising=False)
+    monkeypatch.setattr("motion_cueing.train.training.Interrupt.request", True, raising=False)
     monkeypatch.setattr("motion_cueing.train.training.Interrupt.__init__", lambda self: None)
     assert main([*ARGV, "--out", str(tmp_path), *drive_hours(2)]) == 130
     assert "interrupted, the same command goes on; 0 drives driven now" in capsys.readouterr().out

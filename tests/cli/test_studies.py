@@ -12,7 +12,7 @@ from motion_cueing.envs.platform import ablations, get_platform
 from motion_cueing.envs.settings import save
 from motion_cueing.evaluation.studies.results import StudyResults
 
-from ..evaluation.studies import PAPER, bend
+from ..evaluation.studies.bends import PAPER, bend
 
 
 @pytest.fixture

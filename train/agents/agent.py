@@ -96,10 +96,10 @@ class Agent(TaskPolicy):
         self._check_size("observation", self.network.size, self.layout.size)
         self._check_size("action", self.network.action_size, self.action_size)
 
-    def _check_size(self, what: str, found: int, expected: int) -> None:
-        if found != expected:
+    def _check_size(self, what: str, size: int, expected: int) -> None:
+        if size != expected:
             raise DataError(
-                f"agent {self.name}: its network has {found} entries of {what}, its task {expected}; "
+                f"agent {self.name}: its network has {size} entries of {what}, its task {expected}; "
                 f"give it the {what} options it was trained with"
             )
 

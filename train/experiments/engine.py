@@ -91,7 +91,7 @@ class Listener(Protocol):
         ...
 
     def ended(self, job: Job, ending: Ending) -> None:
-        """How a job ended; the source is asked again after it."""
+        """How a job ended; the engine takes the next job after it."""
         ...
 
 
@@ -137,7 +137,7 @@ def run_jobs(engine: Engine, jobs: Sequence[Job], listener: Listener) -> tuple[d
     """
     left, endings = list(jobs), _Endings(listener)
     interrupted = engine.run(lambda: left.pop(0) if left else None, endings)
-    return endings.found, interrupted
+    return endings.by_name, interrupted
 
 
 class _Endings:
@@ -145,10 +145,10 @@ class _Endings:
 
     def __init__(self, listener: Listener) -> None:
         self.update, self._listener = listener.update, listener
-        self.found: dict[str, Ending] = {}
+        self.by_name: dict[str, Ending] = {}
 
     def ended(self, job: Job, ending: Ending) -> None:
-        self.found[job.name] = ending
+        self.by_name[job.name] = ending
         self._listener.ended(job, ending)
 
 
@@ -327,7 +327,7 @@ _ENVIRONMENT: Final = {
 _ALONE: Final = {
     # Ray listens on 127.0.0.1 alone, as it does on Windows and macOS by default.
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
-    # Other users of the machine are kept out, and no token is left in the home folder.
+    # Other users of the machine have no access, and no token stays in the home folder.
     "RAY_AUTH_MODE": "token",
     "RAY_AUTH_TOKEN": secrets.token_hex(32),
 }

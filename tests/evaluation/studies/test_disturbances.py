@@ -81,9 +81,9 @@ def test_an_agent_meets_a_machine_it_does_not_know():
     assert lagging.make("learned-preview").platform == lagging.platform
 
 
-def test_a_policy_that_is_told_the_drive_is_left_out_where_it_must_be_causal():
+def test_a_policy_that_knows_the_drive_is_refused_where_it_must_be_causal():
     make = robust(["classical-per-maneuver"]).conditions()[0].make
-    with pytest.raises(ConfigurationError, match="told the drive"):
+    with pytest.raises(ConfigurationError, match="knows the drive"):
         make("classical-per-maneuver")
     assert robust().conditions()[0].make("classical-per-maneuver") is not None
 

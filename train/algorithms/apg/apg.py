@@ -76,7 +76,7 @@ class ApgHyperparameters:
 
 
 class ActorOptimizer:
-    """Adam with clipped gradients and a warm cosine schedule; hidden layers by Muon where asked for.
+    """Adam with clipped gradients and a warm cosine schedule; hidden layers optionally by Muon.
 
     Muon (Jordan et al. 2024) replaces the gradient of a layer's matrix by the nearest one with equal singular
     values: a step has its size in every direction, not only in the few where the cost is steep.

@@ -172,9 +172,9 @@ def _activation(layers: Iterable[nn.Module]) -> str:
     if not kinds:
         return "tanh"
     if len(kinds) > 1 or not kinds <= _NAMES.keys():
-        found = ", ".join(sorted(kind.__name__ for kind in kinds))
+        names = ", ".join(sorted(kind.__name__ for kind in kinds))
         hint = "; with use_sde set policy_kwargs.clip_mean to 0" if nn.Hardtanh in kinds else ""
         raise DataError(
-            f"the policy has layers {found}; a network has one of {', '.join(TORCH_ACTIVATIONS)}{hint}"
+            f"the policy has layers {names}; a network has one of {', '.join(TORCH_ACTIVATIONS)}{hint}"
         )
     return _NAMES[kinds.pop()]

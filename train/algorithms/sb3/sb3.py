@@ -277,7 +277,7 @@ def _normalized(env: DrivingSimulatorVecEnv, config: TrainingConfig) -> VecNorma
 
 
 class _Callback(BaseCallback):
-    """Tells the monitor of every step, and the training of every boundary."""
+    """Calls the monitor at every step, and the training at every boundary."""
 
     def __init__(self, boundary: Boundary, monitor: Monitor, simulators: DrivingSimulatorVecEnv) -> None:
         super().__init__()
