@@ -62,12 +62,7 @@ def run(command: CurvesCommand) -> int:
 
 
 def read_curve(folder: Path, scalar: str) -> Curve:
-    """Steps and values of a scalar in the log of a training.
-
-    Raises:
-        UnknownNameError: the log has no such scalar.
-        DataError: there is no log, or it is broken.
-    """
+    """Steps and values of a scalar in the log of a training."""
     from ..train.logs import STEPS, read_log
 
     rows = read_log(folder)

@@ -144,11 +144,7 @@ def _setting(command: DemonstrateCommand, demonstrator: Demonstrator) -> dict[st
 
 
 def _index(command: DemonstrateCommand, setting: dict[str, Any]) -> Index:
-    """The folder's index, or a new one; with ``--fresh`` the drives of the old one are removed.
-
-    Raises:
-        ConfigurationError: the folder holds drives of another controller, car or motion base.
-    """
+    """The folder's index, or a new one; with ``--fresh`` the drives of the old one are removed."""
     from ..envs.provenance import command_line, commit, hardware, now, versions
     from ..train.algorithms.dagger.demonstrations import INDEX, Index, load_index
 

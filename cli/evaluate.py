@@ -163,11 +163,6 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     Args:
         command: Its arguments.
         words: The command line, program first.
-
-    Raises:
-        UnknownNameError: a name is not registered.
-        ConfigurationError: a YAML file has a wrong field.
-        DataError: a file is missing or broken.
     """
     from ..evaluation.suite import DRIVEN, cue_sources, load_drives
 

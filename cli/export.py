@@ -51,11 +51,7 @@ def run(command: ExportCommand) -> int:
 
 
 def _agent(name: str) -> Agent:
-    """The agent of a name or file.
-
-    Raises:
-        MotionCueingError: it is another kind of policy, or there is none.
-    """
+    """The agent of a name or file."""
     from ..evaluation.policies import find_agent, is_agent, policy_names
     from ..train.agents import agent_names
 

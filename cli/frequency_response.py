@@ -94,11 +94,7 @@ def _save(responses: list[FrequencyResponse], command: FrequencyResponseCommand)
 
 
 def measure_all(command: FrequencyResponseCommand) -> Measured:
-    """The response of each policy, once all arguments are checked.
-
-    Raises:
-        MotionCueingError: an argument is wrong, or a policy named by the user cannot be tested.
-    """
+    """The response of each policy, once all arguments are checked."""
     from ..evaluation.frequency_response.response import frequency_response
     from ..evaluation.suite import explain
 

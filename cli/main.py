@@ -317,9 +317,6 @@ def parse(name: str, arguments: Sequence[str]) -> Any:
 
     Returns:
         Its dataclass; None where its help was requested and has been shown.
-
-    Raises:
-        ConfigurationError: an argument is wrong.
     """
     from cyclopts import CycloptsError
 

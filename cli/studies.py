@@ -140,11 +140,7 @@ def run_robustness(command: RobustnessCommand) -> int:
 
 
 def make_study(command: RobustnessCommand) -> Study:
-    """Everything but the policies, all names resolved.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Everything but the policies, all names resolved."""
     from ..envs.maneuvers import maneuver_names
     from ..evaluation.benchmark import benchmark_policies
     from ..evaluation.policies import policy_names

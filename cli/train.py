@@ -198,11 +198,7 @@ def run_population(command: PopulationCommand) -> int:
 
 
 def check(command: TrainingOptions) -> None:
-    """Refuse options that do not go together.
-
-    Raises:
-        ConfigurationError: an option is wrong, or a package is missing.
-    """
+    """Refuse options that do not go together."""
     missing = [name for name in _NEEDED if find_spec(name) is None]
     if missing:
         raise ConfigurationError(
@@ -217,11 +213,7 @@ def check(command: TrainingOptions) -> None:
 
 
 def place(command: TrainingOptions) -> Place:
-    """Where trainings run, checked before anything is written.
-
-    Raises:
-        ConfigurationError: a package is missing.
-    """
+    """Where trainings run, checked before anything is written."""
     from ..train.experiments.seeds import Place
 
     place = Place(command.engine, command.workers, command.address)
@@ -255,9 +247,6 @@ def goes_on(command: TrainingOptions, kind: str) -> bool:
     Args:
         command: The options.
         kind: "training", "seeds", "search" or "population".
-
-    Raises:
-        DataError: the folder holds something else.
     """
     out = command.out
     if out is None or not out.is_dir() or not any(out.iterdir()):
@@ -287,11 +276,7 @@ _COMMAND: Final = {
 
 
 def check_same(command: TrainingOptions, begun: TrainingConfig) -> None:
-    """Refuse options that differ from those that the training in --out was begun with; --steps may.
-
-    Raises:
-        ConfigurationError: one does.
-    """
+    """Refuse options that differ from those that the training in --out was begun with; --steps may."""
     from ..envs.settings import to_dict
     from ..train.config import load_config
 

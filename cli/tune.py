@@ -166,11 +166,7 @@ def _new(command: TuneCommand) -> Record:
 
 
 def _begun(command: TuneCommand) -> Record:
-    """The record of an earlier session, with the requested hours.
-
-    Raises:
-        ConfigurationError: an option is given that differs from the search's.
-    """
+    """The record of an earlier session, with the requested hours."""
     from ..baselines.tuning.search import load_record
     from ..baselines.washout.families import algorithm_of, load_of
 

@@ -81,9 +81,6 @@ class TrainingLog:
     Args:
         folder: Of the training.
         steps: Actions so far; later rows, of a training that was broken off, are dropped.
-
-    Raises:
-        DataError: the file of an earlier session is broken.
     """
 
     def __init__(self, folder: Path, steps: int = 0) -> None:

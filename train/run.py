@@ -120,11 +120,7 @@ class RunFolder:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> RunFolder:
-        """The folder of a new training, made when it begins; by default the next of ``runs/ALGO-1``, -2...
-
-        Raises:
-            ConfigurationError: the folder is not empty.
-        """
+        """The folder of a new training, made when it begins; by default the next of ``runs/ALGO-1``, -2..."""
         return cls(free_folder(path, config.algo), config)
 
     @classmethod
@@ -145,11 +141,7 @@ class RunFolder:
 
     @classmethod
     def take_up(cls, path: Path, config: TrainingConfig) -> RunFolder:
-        """The folder of a training that may have been begun: of a process that died, nobody knows.
-
-        Raises:
-            DataError: a file of it is broken.
-        """
+        """The folder of a training that may have been begun: of a process that died, nobody knows."""
         run = cls.open(path) if (path / _RECORD).exists() else cls(path, config)
         run.config = config
         return run
@@ -206,11 +198,7 @@ class RunFolder:
         return path
 
     def last_checkpoint(self) -> dict[str, Any] | None:
-        """The latest checkpoint's state; None where there is none yet.
-
-        Raises:
-            DataError: it is damaged.
-        """
+        """The latest checkpoint's state; None where there is none yet."""
         checkpoints = checkpoints_in(self.checkpoints)
         return read_checkpoint(checkpoints[-1]) if checkpoints else None
 

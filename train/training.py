@@ -32,11 +32,7 @@ from .validation import Score, Validation
 
 
 def initial_agent(config: TrainingConfig) -> Agent | None:
-    """The agent of ``config.initial``, or None where nothing is named.
-
-    Raises:
-        DataError: the file cannot be read.
-    """
+    """The agent of ``config.initial``, or None where nothing is named."""
     return None if config.initial is None else Agent.load(config.initial)
 
 
@@ -58,12 +54,7 @@ def initial_network(config: TrainingConfig) -> Network | None:
 
 
 def start_actor(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
-    """Initialize an actor: the network of ``config.initial``, or a spring to neutral where none is named.
-
-    Raises:
-        DataError: the agent's file cannot be read, or its network has other layers.
-        ConfigurationError: that agent has another observation, action or platform.
-    """
+    """Initialize an actor: the network of ``config.initial``, or a spring to neutral where none is named."""
     network = initial_network(config)
     if network is None:
         start_as_spring_damper(actor, batch)
@@ -136,10 +127,6 @@ class Training:
         run: The folder; a checkpoint in it is gone on from.
         tell: Receives the status at every boundary.
         interrupt: Whoever decides when to stop; default: Ctrl-C, which is caught while it trains.
-
-    Raises:
-        ConfigurationError: the configuration does not fit its algorithm.
-        DataError: the checkpoint is damaged.
     """
 
     def __init__(

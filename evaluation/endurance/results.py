@@ -325,9 +325,6 @@ class EnduranceStore:
         policy: Label of the policy.
         key: Of :func:`endurance_key`; drives of another key are not taken.
         fresh: Remove what is kept.
-
-    Raises:
-        DataError: a file is damaged.
     """
 
     def __init__(self, folder: Path, policy: str, key: str, fresh: bool = False) -> None:

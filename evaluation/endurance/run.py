@@ -65,9 +65,6 @@ def seeded_drives(endurance: Endurance, seeds: Sequence[int]) -> list[SeededDriv
     """The drives of seeds; those whose car leaves the range of its model are skipped.
 
     A car that slides off its path stays in: its driver feels that, too.
-
-    Raises:
-        ConfigurationError: a seed or the duration is out of range.
     """
     plans = [endurance.drives.plan(seed, endurance.duration) for seed in seeds]
     frictions = [_friction(endurance, seed) for seed in seeds]

@@ -119,12 +119,7 @@ def save_json(responses: Sequence[FrequencyResponse], arguments: Sequence[str], 
 
 
 def load_json(path: str | Path) -> list[FrequencyResponse]:
-    """Read what :func:`save_json` wrote.
-
-    Raises:
-        DataError: the file is missing, broken, or of another version.
-        ConfigurationError: a field is missing, unknown or wrong.
-    """
+    """Read what :func:`save_json` wrote."""
     return list(SavedResponses.load_json(path).responses)
 
 

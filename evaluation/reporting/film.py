@@ -87,11 +87,7 @@ def drawn(trajectory: Trajectory, platform: Platform, time: float, size: tuple[i
 
 
 def check_suffix(path: Path) -> str:
-    """The kind of a film's file.
-
-    Raises:
-        DataError: it is none of :data:`SUFFIXES`.
-    """
+    """The kind of a film's file."""
     if path.suffix.lower() not in SUFFIXES:
         raise DataError(f"{path}: name a file that ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     return path.suffix.lower()

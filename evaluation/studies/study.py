@@ -106,11 +106,7 @@ def _read(path: Path) -> KeptPair:
 
 
 def check_kept(folder: Path) -> None:
-    """Refuse damaged files of drives in the folder of a study, all at once.
-
-    Raises:
-        DataError: files are damaged.
-    """
+    """Refuse damaged files of drives in the folder of a study, all at once."""
     damaged = [path for path in _files(folder) if not _readable(path)]
     if damaged:
         names = ", ".join(map(str, damaged))

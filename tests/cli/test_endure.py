@@ -113,7 +113,7 @@ def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
 
 
 def test_ctrl_c_ends_it_with_what_was_driven(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("motion_cueing.train.training.Interrupt.request", True, raising=False)
+    monkeypatch.setattr("motion_cueing.train.training.Interrupt.asked", True, raising=False)
     monkeypatch.setattr("motion_cueing.train.training.Interrupt.__init__", lambda self: None)
     assert main([*ARGV, "--out", str(tmp_path), *drive_hours(2)]) == 130
     assert "interrupted, the same command goes on; 0 drives driven now" in capsys.readouterr().out

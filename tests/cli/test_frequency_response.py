@@ -60,11 +60,11 @@ class Tired:
 
 
 @pytest.fixture
-def ladder(monkeypatch):
-    """A ladder of three: one that can be tested, one that knows its drives alone, one that fails."""
+def three(monkeypatch):
+    """A benchmark of three: one that can be tested, one that knows its drives alone, one that fails."""
     monkeypatch.setattr(
-        "motion_cueing.evaluation.benchmark.ladder_names",
-        lambda known: ["no-motion", "classical-ceiling", "adaptive"],
+        "motion_cueing.evaluation.benchmark.benchmark_policies",
+        lambda known: ["no-motion", "classical-per-maneuver", "adaptive"],
     )
     made = policies.make_policy
     monkeypatch.setattr(
@@ -72,7 +72,7 @@ def ladder(monkeypatch):
     )
 
 
-def test_the_ladder_leaves_out_what_knows_no_sinusoids_and_goes_on_after_a_failure(ladder, tmp_path, capsys):
+def test_the_benchmark_skips_what_knows_no_sinusoids_and_goes_on_after_a_failure(three, tmp_path, capsys):
     assert main([*quick("benchmark"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
     assert (
@@ -83,7 +83,7 @@ def test_the_ladder_leaves_out_what_knows_no_sinusoids_and_goes_on_after_a_failu
 
 
 def test_a_policy_that_knows_no_sinusoids_is_refused_before_anything_is_measured(tmp_path, capsys):
-    assert main([*quick("no-motion", "classical-ceiling"), "--out", str(tmp_path / "out")]) == 2
+    assert main([*quick("no-motion", "classical-per-maneuver"), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert "none for sinusoids" in told
     assert "classical-tuned" in told

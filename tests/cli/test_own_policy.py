@@ -91,7 +91,7 @@ def test_it_is_told_when_its_file_has_changed_that_drives_are_driven_anew(folder
 @pytest.mark.parametrize(
     ("policy", "told"),
     [
-        ("mine.py:Mute", "policy mine.py:Mute: it has no method predict"),
+        ("mine.py:Mute", "is no policy: it has no method predict"),
         ("mine.py:Broken", "policy mine.py:Broken: RuntimeError: out of order"),
         ("mine.py:Nuge", "policy mine.py:Nuge: AttributeError"),
         ("nowhere.py:Nudge", "policy nowhere.py:Nudge: FileNotFoundError: nowhere.py: there is no such file"),

@@ -81,12 +81,12 @@ def test_robustness_writes_everything(cue_file, tmp_path, capsys):
         for who in values["policies"]
     }
     still = ratio["no-motion"]
-    assert {ratio_ for name, ratio_ in still.items() if name != "fierce"} == {1.0}
-    assert still["fierce"] > 1.5
+    assert {ratio_ for name, ratio_ in still.items() if name != "time scaling"} == {1.0}
+    assert still["time scaling"] > 1.5
     for who in ("classical", "learned-preview"):
         # The file's drive is the same in another car; all else changes what a controller gives.
         assert ratio[who]["nominal"] == ratio[who]["other car"] == 1.0
-        for name in ("lag", "dead time", "noise", "fierce"):
+        for name in ("lag", "dead time", "noise", "time scaling"):
             assert ratio[who][name] != 1.0
 
 

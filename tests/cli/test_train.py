@@ -18,7 +18,6 @@ from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import load
 from motion_cueing.envs.task.kernels.reward import TERMS
-from motion_cueing.train import registry
 from motion_cueing.train import training as interrupt
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig
@@ -154,7 +153,7 @@ def complaint(words: list[str], capsys) -> str:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["train"], "--algorithm must be given; use one of ppo, sac, td3, tqc"),
+        (["train"], "--algorithm is missing; use one of ppo, sac, td3, tqc"),
         (["train", "--algorithm", "poo"], "unknown algorithm 'poo'. Did you mean ppo"),
         (["train", "--algorithm", "ppo", "--steps", "0"], "field 'steps'"),
         (["train", "--algorithm", "ppo", "--steps", "many"], "--steps takes a whole number, found 'many'"),
@@ -233,23 +232,6 @@ def test_help_needs_no_learning_library():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip().endswith("[]")
     assert "--fresh" in done.stdout
-
-
-def test_another_algorithm_can_be_registered(tmp_path, monkeypatch):
-    preset = tiny.config_file(tmp_path, "ppo", algo="mine")
-    module = "motion_cueing.train.algorithms.sb3.learner"
-    monkeypatch.setattr(registry, "_ALGORITHMS", dict(registry._ALGORITHMS))
-    monkeypatch.setitem(sys.modules[module].CLASSES, "mine", sys.modules[module].CLASSES["ppo"])
-    registry.register(registry.Algorithm("mine", module, "the same again", preset=preset))
-    assert "mine" in registry.algorithm_names()
-    assert main(["train", "--algorithm", "mine", "--out", str(tmp_path / "run")]) == 0
-    assert Agent.load(tmp_path / "run" / "final.safetensors").record.algo == "mine"
-
-
-def test_an_algorithm_whose_library_is_missing_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "find_spec", lambda name: None)
-    with pytest.raises(ConfigurationError, match="tqc needs torch, stable_baselines3, sb3_contrib: pip"):
-        registry.make_learner(tiny.config(tmp_path, "tqc"))
 
 
 def test_folders_are_numbered_where_none_is_named(tmp_path, monkeypatch):

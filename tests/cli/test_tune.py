@@ -44,7 +44,7 @@ def test_what_it_writes_is_a_policy_and_says_how_it_was_made(words, tmp_path, ca
         assert f"# {line.strip()}\n" in text
     start, tuned = (float(found) for found in re.findall(r"J ([\d.]+), perceived", text))
     assert 0.0 < tuned < start
-    found = load_record(tmp_path / "mine.search.json").found
+    found = load_record(tmp_path / "mine.search.json").results
     hours = sum(step.hours for step in found)
     assert f"# {hours:.3g} h simulated in {len(found)} steps (budget 0.0466667 h, and what was begun" in text
     policy = make_policy(tmp_path / "mine.yaml", get_platform("paper"))
@@ -95,18 +95,18 @@ def test_ctrl_c_keeps_the_search_and_resume_ends_where_it_would_have(words, tmp_
     (tmp_path / "mine.search.json").unlink()
 
     with monkeypatch.context() as pressed:
-        pressed.setattr("motion_cueing.train.training.Interrupt", PressedLater)
+        pressed.setattr("motion_cueing.envs.interrupt.Interrupt", PressedLater)
         assert main(words) == 130
     assert "go on with: motion-cueing tune --algorithm classical --out mine.yaml" in capsys.readouterr().err
-    assert len(load_record(tmp_path / "mine.search.json").found) == 3
+    assert len(load_record(tmp_path / "mine.search.json").results) == 3
     assert main(["tune", "--algorithm", "classical", "--out", "mine.yaml"]) == 0
     assert load_record(tmp_path / "mine.search.json") == whole
     # A larger budget goes on from the end.
     longer = str(2.0 * whole.options.budget)
     assert main(["tune", "--algorithm", "classical", "--out", "mine.yaml", "--hours", longer]) == 0
     further = load_record(tmp_path / "mine.search.json")
-    assert further.found[: len(whole.found)] == whole.found
-    assert len(further.found) > len(whole.found)
+    assert further.results[: len(whole.results)] == whole.results
+    assert len(further.results) > len(whole.results)
 
 
 def test_fresh_begins_a_search_anew(words, tmp_path):
@@ -196,7 +196,7 @@ def test_every_family_is_tuned_the_same_way(algorithm, start, words, tmp_path, c
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (["--method", "gradient"], "only the classical washout has a gradient; use method cma"),
+        (["--method", "gradient"], "washout has no gradient; use method cma"),
         (
             ["--start", "classical"],
             "a set of the classical washout; give one of the adaptive washout",

@@ -341,9 +341,6 @@ class RayEngine(_Workers):
         jobs: At a time, of one thread each; one of more threads takes the place of as many. Default: one a
             core.
         address: HOST:PORT of a cluster, of which this machine is a node; default: this machine alone.
-
-    Raises:
-        ConfigurationError: Ray is not installed.
     """
 
     def __init__(self, jobs: int | None = None, address: str | None = None) -> None:
@@ -457,12 +454,7 @@ def _perform_on_ray(job: Job, mailbox: Any, arguments: list[str], folder: str) -
 
 
 def _knock(address: str) -> None:
-    """Refuse an address where nobody listens.
-
-    Raises:
-        ConfigurationError: it is no HOST:PORT.
-        DataError: nobody does.
-    """
+    """Refuse an address where nobody listens."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit():
         raise ConfigurationError(f"--address {address}: expected HOST:PORT, as 10.0.0.5:6379")

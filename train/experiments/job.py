@@ -42,12 +42,7 @@ class TrainingJob:
     parent: Path | None = None
 
     def run(self, report: Report) -> Outcome:
-        """Train; an outcome is interrupted where it was stopped before ``until``.
-
-        Raises:
-            DataError: the folder is not on this machine, or a checkpoint is damaged.
-            ConfigurationError: the configuration does not fit its algorithm.
-        """
+        """Train; an outcome is interrupted where it was stopped before ``until``."""
         if not self.path.parent.is_dir():
             raise DataError(
                 f"{self.path.parent} is not there on {platform.node()}; "

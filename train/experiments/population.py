@@ -156,11 +156,7 @@ class Population:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> Population:
-        """A new population.
-
-        Raises:
-            ConfigurationError: the folder is not empty, or the configuration is none of a population.
-        """
+        """A new population."""
         population = cls(free_folder(path, f"{config.algo}-population"), config)
         members = range(config.population.members)
         first = [Member(draw(config.search, population._random(0, member))) for member in members]
@@ -171,11 +167,7 @@ class Population:
 
     @classmethod
     def open(cls, path: Path) -> Population:
-        """A population that was begun.
-
-        Raises:
-            DataError: there is none, or its file is broken.
-        """
+        """A population that was begun."""
         population = cls(path, load(TrainingConfig, path / _CONFIG))
         try:
             state = json.loads((path / _STATE).read_text(encoding="utf-8"))
@@ -203,11 +195,7 @@ class Population:
         return self.path / "best.safetensors"
 
     def run(self, engine: Engine, listener: Listener) -> bool:
-        """Train until the last generation is done; returns whether Ctrl-C stopped it.
-
-        Raises:
-            DataError: a member failed, or none of a generation has a finite rating.
-        """
+        """Train until the last generation is done; returns whether Ctrl-C stopped it."""
         while True:
             if any(member.rating is None for member in self.generations[-1]):
                 endings, interrupted = run_jobs(engine, self.jobs(), listener)

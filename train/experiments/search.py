@@ -56,11 +56,7 @@ def varied(config: TrainingConfig, values: Mapping[str, Any], **fields: Any) -> 
 
 
 def check_space(config: TrainingConfig) -> None:
-    """Refuse a space with nothing in it, or whose ends are no configurations.
-
-    Raises:
-        ConfigurationError: there is nothing to vary, or a field cannot be set so.
-    """
+    """Refuse a space with nothing in it, or whose ends are no configurations."""
     if not config.search:
         raise ConfigurationError("search is empty; name fields to vary, as hyperparameters.learning_rate")
     for end in (first, last):
@@ -82,11 +78,7 @@ def _number(choice: Choice, value: float) -> float | int:
 
 
 def _set(values: dict[str, Any], path: str, value: Any) -> None:
-    """Set a field by its path.
-
-    Raises:
-        ConfigurationError: the path does not lead through fields.
-    """
+    """Set a field by its path."""
     *parents, last_name = path.split(".")
     for name in parents:
         inner = values.setdefault(name, {})
@@ -113,11 +105,7 @@ class Search:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> Search:
-        """A new search.
-
-        Raises:
-            ConfigurationError: the folder is not empty, or there is nothing to search.
-        """
+        """A new search."""
         search = cls(free_folder(path, f"{config.algo}-search"), config)
         save(config, search.path / _CONFIG)
         (search.path / _TRIALS).mkdir(exist_ok=True)
@@ -126,11 +114,7 @@ class Search:
 
     @classmethod
     def open(cls, path: Path) -> Search:
-        """A search that was begun.
-
-        Raises:
-            DataError: there is none.
-        """
+        """A search that was begun."""
         if not is_search(path):
             raise DataError(f"--out {path}: no search was begun there ({JOURNAL} is missing)")
         return cls(path, load(TrainingConfig, path / _CONFIG))

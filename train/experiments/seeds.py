@@ -56,22 +56,14 @@ class Seeds:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig, count: int) -> Seeds:
-        """New trainings.
-
-        Raises:
-            ConfigurationError: the folder is not empty.
-        """
+        """New trainings."""
         seeds = cls(free_folder(path, f"{config.algo}-seeds"), SeedsPlan(config, count))
         save(seeds.plan, seeds.path / _PLAN)
         return seeds
 
     @classmethod
     def open(cls, path: Path, steps: int | None = None) -> Seeds:
-        """Trainings that were begun, perhaps with another length.
-
-        Raises:
-            DataError: there are none.
-        """
+        """Trainings that were begun, perhaps with another length."""
         plan = load(SeedsPlan, path / _PLAN)
         if steps is not None:
             plan = replace(plan, config=replace(plan.config, steps=steps))
@@ -209,11 +201,7 @@ class Place:
     address: str | None = None
 
     def check(self) -> None:
-        """Refuse an engine that is not there before anything is written.
-
-        Raises:
-            ConfigurationError: a package is missing.
-        """
+        """Refuse an engine that is not there before anything is written."""
         make_engine(self.engine, self.jobs, self.address)
 
     @contextmanager
@@ -237,11 +225,7 @@ def kind_of(path: Path) -> str | None:
 
 
 def run_training(folder: RunFolder, place: Place) -> int:
-    """One training on an engine; returns the exit status.
-
-    Raises:
-        DataError: it failed.
-    """
+    """One training on an engine; returns the exit status."""
     folder.path.parent.mkdir(parents=True, exist_ok=True)
     job = TrainingJob("training", folder.path.resolve(), folder.config)
     with place.open() as (engine, progress):

@@ -141,9 +141,6 @@ class ApgLearner(Learner):
 
     Args:
         config: The training.
-
-    Raises:
-        ConfigurationError: a hyperparameter is wrong, or the task has no gradients.
     """
 
     def __init__(self, config: TrainingConfig) -> None:

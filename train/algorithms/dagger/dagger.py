@@ -173,10 +173,6 @@ class DaggerLearner(Learner):
 
     Args:
         config: The training; ``task.episode.duration`` is the length of an episode.
-
-    Raises:
-        ConfigurationError: a hyperparameter is wrong, or the task is one that a teacher cannot act in.
-        UnknownNameError: no policy has the teacher's name.
     """
 
     def __init__(self, config: TrainingConfig) -> None:

@@ -107,9 +107,6 @@ def coordinates(washout: LinearWashout, memories: int) -> Floats:
     Args:
         washout: The gains; shares that are not given are 0.
         memories: Time constants of the memory.
-
-    Raises:
-        ConfigurationError: there are more shares than time constants.
     """
     shares = []
     for name in ("carriage_shares", "tilt_shares"):
@@ -241,9 +238,6 @@ class LinearLearner(Learner):
 
     Args:
         config: The training; every candidate drives ``n_envs`` episodes of ``task.episode.duration``.
-
-    Raises:
-        ConfigurationError: a hyperparameter is wrong, or the task is one that has no linear washout.
     """
 
     def __init__(self, config: TrainingConfig) -> None:

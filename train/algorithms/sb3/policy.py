@@ -135,11 +135,7 @@ def _load_statistics(network: Network, normalize: VecNormalize | None, weight: f
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
-    """Layers from the observation to the action; whether a tanh follows; whether there is a skip connection.
-
-    Raises:
-        DataError: the policy is of another kind.
-    """
+    """Layers from observation to action; whether a tanh follows; whether there is a skip connection."""
     if isinstance(model.policy, RecurrentActorCriticPolicy):
         reason = "it has a memory, which no agent has; train PPO, SAC, TD3 or TQC"
     elif isinstance(model.policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy):

@@ -175,9 +175,6 @@ class SB3Learner(Learner):
 
     Args:
         config: The training.
-
-    Raises:
-        ConfigurationError: a hyperparameter is unknown or of the wrong type.
     """
 
     def __init__(self, config: TrainingConfig) -> None:

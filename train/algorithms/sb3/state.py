@@ -50,11 +50,7 @@ def restore(
     simulators: DrivingSimulatorVecEnv,
     normalize: VecNormalize | None,
 ) -> None:
-    """Put a model made of the same configuration into a state.
-
-    Raises:
-        DataError: the state is of another configuration or version.
-    """
+    """Put a model made of the same configuration into a state."""
     with restoring():
         _restore_model(state, model)
         _restore_replay(state["replay"], model)
