@@ -6,17 +6,18 @@ Studies, endurance, frequency responses and the paper's cases have files of thei
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 
 from pydantic import JsonValue
 from typing_extensions import Self
 
 from ..envs.errors import DataError
-from ..envs.provenance import now, plain, versions
+from ..envs.provenance import now, package_version, plain, versions
 from ..envs.settings import configuration, from_dict, renamed, to_dict
 from ..envs.storage import write_text
 from .comparison import NormalizedScore, SuiteScore, Verdict, judge, judge_suite, normalized_scores
@@ -96,6 +97,35 @@ class Headed(Saved):
             "created": now(),
             "versions": versions(),
         }
+
+
+T = TypeVar("T")
+
+
+def load_drives_done(kind: type[T], path: Path, of: str) -> T:
+    """Read a file of finished drives.
+
+    Args:
+        kind: The configuration in it.
+        path: The file, which exists.
+        of: What the drives belong to, for messages.
+    """
+    try:
+        return from_dict(kind, json.loads(path.read_text(encoding="utf-8")), str(path))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError:
+        # Which of its many numbers is wrong helps nobody.
+        raise DataError(f"{path}: damaged, not the drives of {of}; delete it, or add --fresh") from None
+
+
+def drive_key(**parts: Any) -> str:
+    """A hash of everything that a drive depends on, as plain values.
+
+    The version of the package is in it, changes to its code within a version are not.
+    """
+    whole = {"version": package_version(), **parts}
+    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def save_rows(

@@ -62,6 +62,23 @@ def start_actor(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
         actor.load(network)
 
 
+def check_episodes(config: TrainingConfig, why: str) -> None:
+    """Refuse settings of algorithms that learn from whole episodes, on the CPU, in the machine's own scales.
+
+    Args:
+        config: The training.
+        why: The reason why observations and rewards are not normalized.
+    """
+    if config.task.episode.duration is None:
+        raise ConfigurationError(
+            "task.episode.duration must say how long an episode is, s; 20 is a good start"
+        )
+    if config.normalize.observation or config.normalize.reward:
+        raise ConfigurationError(f"normalize must be off for {config.algo}: {why}")
+    if not str(config.device).startswith("cpu"):
+        raise ConfigurationError(f"device {config.device}: {config.algo} runs on the CPU")
+
+
 _WARM_UP: Final = 0.1
 """Share of the training in which the learning rate rises."""
 

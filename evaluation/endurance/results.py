@@ -16,18 +16,16 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from ...envs.car import car_names
-from ...envs.errors import DataError
 from ...envs.maneuvers import RandomDrives
 from ...envs.maneuvers.roads import KINDS
 from ...envs.platform import Platform
-from ...envs.provenance import package_version
-from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
+from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.storage import write_text
 from ...envs.task import RandomizationOptions, TaskOptions
 from ...envs.task.drives import machines_of
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
-from ..results import Headed, save_rows
+from ..results import Headed, load_drives_done, save_rows
 
 NOMINAL: Final = "nominal"
 """Name of the condition with the machine as it should be."""
@@ -96,7 +94,7 @@ class Endured:
         perceived_cue_error: J of the perceived cues.
         at_limit: Share of time with any actuator held back by any limit.
         beyond: Samples at which the true motion is beyond any limit.
-        exceeded: Samples by kind of limit, see :data:`~.checks.KINDS`.
+        exceeded: Samples by kind of limit, see :data:`~.run.KINDS`.
         actions_not_finite: Actions with an entry that is no finite number.
     """
 
@@ -164,7 +162,7 @@ class PolicyEndurance:
     """The finished drives of a policy.
 
     Args:
-        key: Hash of everything that drives depend on; see :func:`endurance_key`.
+        key: Hash of everything that drives depend on but their seeds; see :func:`~..results.drive_key`.
         drives: Finished drives.
         extremes: By condition; of all kept drives, also where fewer are requested.
     """
@@ -266,7 +264,8 @@ def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSum
     """
     nominal, slower = ([drive.conditions[name] for drive in drives] for name in (NOMINAL, SLOWER))
     both = [*nominal, *slower]
-    worst = max(drives, key=lambda drive: _or_inf(drive.conditions[SLOWER].cue_error))
+    errors = [float("inf") if one.cue_error is None else one.cue_error for one in slower]
+    worst = drives[errors.index(max(errors))]
     return EnduranceSummary(
         drives=len(drives),
         hours=sum(one.samples - 1 for one in nominal) * time_step / 3600.0,
@@ -305,10 +304,6 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return sum(known) / len(known) if len(known) == len(values) else None
 
 
-def _or_inf(value: float | None) -> float:
-    return float("inf") if value is None else value
-
-
 def _ratio(over: float | None, under: float | None) -> float | None:
     return over / under if over is not None and under else None
 
@@ -323,7 +318,7 @@ class EnduranceStore:
     Args:
         folder: Of the results.
         policy: Label of the policy.
-        key: Of :func:`endurance_key`; drives of another key are not taken.
+        key: See :class:`PolicyEndurance`; drives of another key are not taken.
         fresh: Remove what is kept.
     """
 
@@ -332,22 +327,9 @@ class EnduranceStore:
         self._path = folder / FOLDER / f"{plain_name(policy)}-{tag}.json"
         if fresh:
             self._path.unlink(missing_ok=True)
-        self.kept = self._load(key)
-
-    def _load(self, key: str) -> PolicyEndurance:
-        try:
-            kept = from_dict(
-                PolicyEndurance, json.loads(self._path.read_text(encoding="utf-8")), str(self._path)
-            )
-        except FileNotFoundError:
-            return PolicyEndurance(key)
-        except OSError as error:
-            raise DataError(f"{self._path}: cannot be read ({error.strerror})") from None
-        except ValueError:
-            raise DataError(
-                f"{self._path}: damaged, not the drives of an endurance; delete it, or add --fresh"
-            ) from None
-        return kept if kept.key == key else PolicyEndurance(key)
+        empty = PolicyEndurance(key)
+        kept = load_drives_done(PolicyEndurance, self._path, "an endurance") if self._path.exists() else empty
+        self.kept = kept if kept.key == key else empty
 
     def missing(self, seeds: Sequence[int]) -> list[int]:
         """Those of the seeds whose drives are not done."""
@@ -368,23 +350,6 @@ class EnduranceStore:
         }
         self.kept = PolicyEndurance(before.key, (*before.drives, *drives), merged)
         write_text(self._path, json.dumps(to_dict(self.kept), allow_nan=False) + "\n")
-
-
-def endurance_key(platform: Platform, endurance: Endurance, policy: Mapping[str, Any]) -> str:
-    """A hash of everything that a policy's drives depend on, but their seeds.
-
-    Args:
-        platform: The machine.
-        endurance: Options of the drives.
-        policy: From :func:`~..studies.study.identity`.
-    """
-    whole = {
-        "version": package_version(),
-        "platform": to_dict(platform),
-        "endurance": to_dict(endurance),
-        "policy": dict(policy),
-    }
-    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
 
 
 _SHARES: Final = ("position", "rate", "acceleration")

@@ -183,10 +183,8 @@ def matrix_figure(responses: Sequence[FrequencyResponse], criteria: Criteria | N
                 grid[i, 0].set_ylabel(f"simulator {simulated}")
             grid[0, j].set_title(f"car's {moved}")
             grid[-1, j].set_xlabel("rad/s")
-        simulated = {
-            r.policy for r in responses for j in r.inputs for i in CUE_AXES if np.any(r.response(j, i))
-        }
-        _finish(figure, responses, "Every axis to every input", simulated, _ABOUT_MATRIX)
+        drawn = {r.policy for r in responses for j in r.inputs for i in CUE_AXES if np.any(r.response(j, i))}
+        _finish(figure, responses, "Every axis to every input", drawn, _ABOUT_MATRIX)
         return png(figure)
 
 

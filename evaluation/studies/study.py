@@ -17,11 +17,11 @@ from ...envs.car import Car
 from ...envs.cues import CueTrace
 from ...envs.errors import DataError, MotionCueingError
 from ...envs.platform import Platform
-from ...envs.provenance import package_version
-from ...envs.settings import configuration, from_dict, to_dict
+from ...envs.settings import configuration, to_dict
 from ...envs.storage import write_text
 from ..metrics import Metrics, measure
 from ..reporting.text import plain_name
+from ..results import drive_key, load_drives_done
 from ..rollout import rollout, statistics_of
 from ..suite import CueSource, explain
 from .results import StudyFailure
@@ -34,7 +34,7 @@ class KeptDrive:
     """One drive.
 
     Args:
-        key: Of everything that made it what it is; see :func:`drive_key`.
+        key: Of everything that it depends on; see :func:`~..results.drive_key`.
         metrics: What it came to.
         notes: What the policy counted.
     """
@@ -72,7 +72,8 @@ class PairStore:
         tag = hashlib.sha256(f"{condition}\n{policy}".encode()).hexdigest()[:6]
         name = f"{plain_name(condition)}--{plain_name(policy)}-{tag}.json"
         self._path = folder / _FOLDER / name
-        self._pair = _read(self._path) if self._path.exists() else KeptPair(condition, policy, {})
+        empty = KeptPair(condition, policy, {})
+        self._pair = load_drives_done(KeptPair, self._path, "a study") if self._path.exists() else empty
 
     def find(self, maneuver: str, key: str) -> KeptDrive | None:
         """A drive that is done, if nothing about it has changed."""
@@ -95,16 +96,6 @@ def _files(folder: Path) -> list[Path]:
     return sorted((folder / _FOLDER).glob("*.json"))
 
 
-def _read(path: Path) -> KeptPair:
-    try:
-        return from_dict(KeptPair, json.loads(path.read_text(encoding="utf-8")), str(path))
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from None
-    except ValueError:
-        # Which of its many numbers is wrong helps nobody.
-        raise DataError(f"{path}: damaged, not the drives of a study; delete it, or add --fresh") from None
-
-
 def check_kept(folder: Path) -> None:
     """Refuse damaged files of drives in the folder of a study, all at once."""
     damaged = [path for path in _files(folder) if not _readable(path)]
@@ -115,7 +106,7 @@ def check_kept(folder: Path) -> None:
 
 def _readable(path: Path) -> bool:
     try:
-        _read(path)
+        load_drives_done(KeptPair, path, "a study")
     except DataError:
         return False
     return True
@@ -138,31 +129,6 @@ def identity(given: Any, policy: Policy) -> dict[str, Any]:
     }
 
 
-def drive_key(
-    platform: Platform, car: Car, about: Mapping[str, Any], policy: Mapping[str, Any], cues: CueTrace
-) -> str:
-    """A hash of all that makes a drive what it is.
-
-    The version of the package is in it, changes to its code within a version are not.
-
-    Args:
-        platform: The machine.
-        car: The car.
-        about: Of the condition.
-        policy: Of :func:`identity`.
-        cues: The drive.
-    """
-    whole = {
-        "version": package_version(),
-        "platform": to_dict(platform),
-        "car": to_dict(car),
-        "about": dict(about),
-        "policy": dict(policy),
-        "cues": cues.digest(),
-    }
-    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
-
-
 @dataclass(frozen=True, eq=False)
 class Condition:
     """What differs from one part of a study to another.
@@ -175,7 +141,7 @@ class Condition:
         maneuvers: Sources of cues by name.
         make: The policy for this condition, of a name or file or a policy itself; a MotionCueingError skips
             it.
-        about: What else makes a drive what it is, as plain values: a drive that is kept is of the same.
+        about: Everything else that a drive depends on, as plain values.
     """
 
     name: str
@@ -206,17 +172,6 @@ class StudyOutcome:
     driven: int = 0
 
 
-@dataclass(frozen=True, eq=False)
-class _Pair:
-    """One policy under one condition, and where its drives are kept."""
-
-    condition: Condition
-    label: str
-    policy: Policy
-    identity: Mapping[str, Any]
-    store: PairStore
-
-
 class _Study:
     """A study under way: drives pairs, and collects the outcome."""
 
@@ -237,9 +192,35 @@ class _Study:
                 for _ in condition.maneuvers:
                     self._progress(condition.name, label)
                 continue
+            metrics[label] = {}
             store = PairStore(self._folder, condition.name, label)
-            pair = _Pair(condition, label, policy, identity(given, policy), store)
-            metrics[label] = self._drive_pair(pair, cues)
+            about = {
+                "platform": to_dict(condition.platform),
+                "car": to_dict(condition.car),
+                "about": dict(condition.about),
+                "policy": identity(given, policy),
+            }
+            for maneuver in condition.maneuvers:
+                self._progress(f"{condition.name}, {maneuver}", label)
+                if maneuver not in cues:
+                    continue
+                # A policy is a user's code: whatever it raises must not cost the other drives.
+                try:
+                    key = drive_key(**about, cues=cues[maneuver].digest())
+                    done = store.find(maneuver, key)
+                    if done is None:
+                        drive = rollout(policy, cues[maneuver], condition.platform, condition.car)
+                        done = KeptDrive(key, measure(drive), statistics_of(drive.metadata))
+                        store.keep(maneuver, done)
+                        self.outcome.driven += 1
+                except Exception as error:
+                    failure = StudyFailure(condition.name, label, maneuver, explain(error))
+                    self.outcome.failures.append(failure)
+                    continue
+                metrics[label][maneuver] = done.metrics
+                if done.notes:
+                    by_policy = self.outcome.statistics.setdefault(condition.name, {})
+                    by_policy.setdefault(label, {})[maneuver] = done.notes
 
     def _cues(self, condition: Condition) -> dict[str, CueTrace]:
         cues: dict[str, CueTrace] = {}
@@ -249,39 +230,6 @@ class _Study:
             except Exception as error:
                 self.outcome.failures.append(StudyFailure(condition.name, None, maneuver, explain(error)))
         return cues
-
-    def _drive_pair(self, pair: _Pair, cues: Mapping[str, CueTrace]) -> dict[str, Metrics]:
-        """Metrics by maneuver."""
-        condition, label = pair.condition.name, pair.label
-        metrics: dict[str, Metrics] = {}
-        for maneuver in pair.condition.maneuvers:
-            self._progress(f"{condition}, {maneuver}", label)
-            if maneuver not in cues:
-                continue
-            # A policy is a user's code: whatever it raises must not cost the other drives.
-            try:
-                kept = self._drive(pair, maneuver, cues[maneuver])
-            except Exception as error:
-                self.outcome.failures.append(StudyFailure(condition, label, maneuver, explain(error)))
-                continue
-            metrics[maneuver] = kept.metrics
-            if kept.notes:
-                by_policy = self.outcome.statistics.setdefault(condition, {})
-                by_policy.setdefault(label, {})[maneuver] = kept.notes
-        return metrics
-
-    def _drive(self, pair: _Pair, maneuver: str, cues: CueTrace) -> KeptDrive:
-        """A drive that is kept, or is driven now."""
-        condition = pair.condition
-        key = drive_key(condition.platform, condition.car, condition.about, pair.identity, cues)
-        kept = pair.store.find(maneuver, key)
-        if kept is not None:
-            return kept
-        drive = rollout(pair.policy, cues, condition.platform, condition.car)
-        kept = KeptDrive(key, measure(drive), statistics_of(drive.metadata))
-        pair.store.keep(maneuver, kept)
-        self.outcome.driven += 1
-        return kept
 
 
 def run_study(

@@ -213,24 +213,17 @@ class Population:
         until = number * self.interval if number < self.total else None
         folder = self._folder(number)
         folder.mkdir(parents=True, exist_ok=True)
-        return [
-            TrainingJob(
-                f"member-{i}", folder / f"member-{i}", self._config_of(i, member), until, self._parent(member)
-            )
-            for i, member in enumerate(latest)
-        ]
+        jobs, last_only = [], replace(self.config.checkpoints, keep=1)
+        for i, member in enumerate(latest):
+            seed = self.config.seed + i
+            config = varied(self.config, member.values, seed=seed, checkpoints=last_only)
+            before = self._folder(number - 1) / f"member-{member.parent}"
+            parent = None if member.parent is None else before
+            jobs.append(TrainingJob(f"member-{i}", folder / f"member-{i}", config, until, parent))
+        return jobs
 
     def _folder(self, number: int) -> Path:
         return self.path.resolve() / f"generation-{number:03d}"
-
-    def _parent(self, member: Member) -> Path | None:
-        if member.parent is None:
-            return None
-        return self._folder(len(self.generations) - 1) / f"member-{member.parent}"
-
-    def _config_of(self, index: int, member: Member) -> TrainingConfig:
-        last_only = replace(self.config.checkpoints, keep=1)
-        return varied(self.config, member.values, seed=self.config.seed + index, checkpoints=last_only)
 
     def _note(self, endings: Mapping[str, Ending]) -> None:
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]
@@ -243,7 +236,9 @@ class Population:
         if not any(math.isfinite(member.rating or 0.0) for member in latest):
             raise DataError(f"generation {len(self.generations)}: no member's validation is finite")
         self._save()
-        self._forget_checkpoints(len(self.generations) - 1)
+        # The children of the generation before are done: its checkpoints are of no use any more.
+        for path in self._folder(len(self.generations) - 1).glob("*/checkpoints"):
+            shutil.rmtree(path)
 
     def _next_generation(self) -> None:
         """The next generation."""
@@ -253,11 +248,6 @@ class Population:
         values = [member.values for member in latest]
         self.generations.append(next_generation(ratings, values, self.config.search, self.options, random))
         self._save()
-
-    def _forget_checkpoints(self, number: int) -> None:
-        """Nobody goes on from those of a generation whose children are done."""
-        for path in self._folder(number).glob("*/checkpoints"):
-            shutil.rmtree(path)
 
     def _finish(self) -> None:
         """The best agent there ever was, and that of the member that is best at the end."""

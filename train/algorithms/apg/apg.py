@@ -30,7 +30,7 @@ from ...agents import Network
 from ...config import TrainingConfig
 from ...networks import TORCH_ACTIVATIONS, Actor, linear_layers, normalize_by_rollout
 from ...registry import Boundary, Learner, State, restoring
-from ...training import start_actor, warm_cosine
+from ...training import check_episodes, start_actor, warm_cosine
 from .backpropagation import Rollout, clip_outliers
 from .value import ValueBootstrap, ValueOptions
 
@@ -274,18 +274,11 @@ class ApgLearner(Learner):
 
 
 def _check(config: TrainingConfig, window: float | None) -> None:
-    duration = config.task.episode.duration
-    if duration is None:
-        raise ConfigurationError(
-            "task.episode.duration must say how long an episode is, s; 20 is a good start"
-        )
+    check_episodes(config, "gradients need the scales of the machine")
+    duration = config.task.episode.duration or 0.0
     if window is not None and not math.isclose(duration / window, max(round(duration / window), 1)):
         raise ConfigurationError(
             f"hyperparameters.window {window:g} must be a whole part of task.episode.duration {duration:g}"
         )
     if config.task.episode.terminate_on_failure:
         raise ConfigurationError("task.episode.terminate_on_failure has no gradient; leave it off for apg")
-    if config.normalize.observation or config.normalize.reward:
-        raise ConfigurationError("normalize must be off for apg: gradients need the scales of the machine")
-    if not str(config.device).startswith("cpu"):
-        raise ConfigurationError(f"device {config.device}: apg runs on the CPU")

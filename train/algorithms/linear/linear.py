@@ -41,6 +41,7 @@ from ...agents import Network
 from ...config import TrainingConfig
 from ...networks import TORCH_ACTIVATIONS, Actor, start_linear
 from ...registry import Boundary, Learner, State, restoring
+from ...training import check_episodes
 
 Floats = NDArray[np.float64]
 
@@ -329,14 +330,9 @@ class LinearLearner(Learner):
 
 
 def _check(config: TrainingConfig) -> None:
+    check_episodes(config, "gains need the scales of the machine")
     task = config.task
-    if task.episode.duration is None:
-        raise ConfigurationError("task.episode.duration must say how long the episodes are, s")
     if task.action.mode != "acceleration" or task.observation.stack > 1:
         raise ConfigurationError("linear needs task.action.mode acceleration and task.observation.stack 1")
     if task.action.frame != "cab" or task.observation.frame != "cab":
         raise ConfigurationError("task.action.frame and task.observation.frame must be cab for linear")
-    if config.normalize.observation or config.normalize.reward:
-        raise ConfigurationError("normalize must be off for linear: gains need the scales of the machine")
-    if not str(config.device).startswith("cpu"):
-        raise ConfigurationError(f"device {config.device}: linear runs on the CPU")

@@ -135,19 +135,18 @@ def _policy_kwargs(algorithm: type[BaseAlgorithm], given: Any) -> dict[str, Any]
 def _checked(where: str, value: Any, hint: Any) -> Any:
     """``value`` as the annotation has it."""
     if isinstance(value, str) and value.startswith(SCHEDULED):
-        return linear(_number(where, value.removeprefix(SCHEDULED)))
+        text = value.removeprefix(SCHEDULED)
+        try:
+            return linear(float(text))
+        except ValueError:
+            raise ConfigurationError(
+                f"{where}: expected a number after {SCHEDULED}, found {text!r}"
+            ) from None
     try:
         return TypeAdapter(hint, config=_LENIENT).validate_python(value)
     except ValidationError as error:
         reasons = " or ".join(dict.fromkeys(item["msg"] for item in error.errors()))
         raise ConfigurationError(f"{where}: {reasons} (found {value!r})") from None
-
-
-def _number(where: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ConfigurationError(f"{where}: expected a number after {SCHEDULED}, found {text!r}") from None
 
 
 def linear(initial: float) -> Callable[[float], float]:
