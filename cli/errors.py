@@ -45,12 +45,7 @@ OLD_FLAGS: Final[Mapping[str, Mapping[str, str]]] = {
 
 
 def complaint(command: str, error: CycloptsError) -> ConfigurationError:
-    """The parser's error as a sentence.
-
-    Args:
-        command: Name of the command.
-        error: The parser's.
-    """
+    """The parser's error as a sentence."""
     return ConfigurationError(f"{_sentence(command, error)} See `motion-cueing {command} --help`")
 
 

@@ -62,10 +62,8 @@ class Measured:
 
 def run(command: FrequencyResponseCommand) -> int:
     """Measure, print and write; the exit status is 1 if a policy's test failed."""
-    from rich.markup import escape
-
     from ..evaluation.frequency_response.reporting import response_table
-    from ..evaluation.reporting.text import print_table, table_console
+    from ..evaluation.reporting.text import print_note, print_table, table_console
 
     measured = measure_all(command)
     console = table_console()
@@ -74,9 +72,9 @@ def run(command: FrequencyResponseCommand) -> int:
     for response in measured.responses:
         print_table(console, response_table(response))
     for policy, reason in measured.skipped.items():
-        console.print(f"[bold]skipped[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
+        print_note(console, "skipped", f"{policy}: {reason}")
     for policy, reason in measured.failed.items():
-        console.print(f"[bold red]failed[/bold red] {escape(policy)}: {escape(reason)}", highlight=False)
+        print_note(console, "failed", f"{policy}: {reason}")
     if measured.responses:
         where = f"Every axis to every axis is in {command.out}: bode.png, matrix.png, frequency-response.csv"
         console.print(where, highlight=False, markup=False)

@@ -311,10 +311,6 @@ def overview() -> str:
 def parse(name: str, arguments: Sequence[str]) -> Any:
     """The arguments of a command.
 
-    Args:
-        name: Of the command.
-        arguments: Words after it.
-
     Returns:
         Its dataclass; None where its help was requested and has been shown.
     """

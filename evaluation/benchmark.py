@@ -39,8 +39,6 @@ BENCHMARK_POLICIES: Final = (
 )
 """Policies in order: washouts, controllers that see what is now, those that see ahead, and the optimum."""
 
-BENCHMARK: Final = "benchmark"
-"""The name that stands for the policies of the benchmark where names of policies are given."""
 OLD_COLUMNS: Final = {"share": "normalized_score", "perceived_share": "perceived_normalized_score"}
 """Columns of ``ladder.csv``, as ``benchmark.csv`` was called before, by what they are called now."""
 

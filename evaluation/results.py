@@ -128,21 +128,12 @@ def drive_key(**parts: Any) -> str:
     return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def save_rows(
-    rows: Sequence[Mapping[str, Any]], path: str | Path, header: Sequence[str] | None = None
-) -> None:
-    """Write rows as CSV, whole or not at all; None becomes an empty cell.
-
-    Args:
-        rows: Cells by column.
-        path: The file.
-        header: Columns; those of the first row if not given.
-    """
+def save_rows(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
+    """Write rows (cells by column) as CSV, whole or not at all; None becomes an empty cell."""
     import pandas as pd
 
     # Objects keep their own text: a count beside an empty cell stays a whole number.
-    columns = list(header or (rows[0] if rows else ()))
-    save_frame(pd.DataFrame([*map(dict, rows)], columns=columns, dtype=object), path)
+    save_frame(pd.DataFrame([*map(dict, rows)], columns=list(rows[0]) if rows else [], dtype=object), path)
 
 
 def save_frame(frame: pd.DataFrame, path: str | Path) -> None:
@@ -187,14 +178,7 @@ class Provenance:
 
     @classmethod
     def of(cls, words: Sequence[str], platform: Any, car: Any, policies: Mapping[str, Any]) -> Self:
-        """The origin of results that are made now.
-
-        Args:
-            words: The command line, program first.
-            platform: Configuration of the motion base; it has a name.
-            car: Configuration of the car; it has a name.
-            policies: Metadata of each policy.
-        """
+        """The origin of results that a command line makes now, with the metadata of each policy."""
         return cls(
             command=shlex.join(words),
             created=now(),

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
-from rich.markup import escape
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, MotionCueingError
 from .metrics import Criteria, Metrics, measure
-from .reporting.text import how_many
+from .reporting.text import how_many, print_note
 from .results import Failure
 from .rollout import statistics_of
 from .trajectory import Trajectory
@@ -187,7 +186,7 @@ def _number(counted: Mapping[str, str], name: str) -> int:
 def print_troubles(console: Console, notes: Iterable[tuple[str, str, Mapping[str, str]]]) -> None:
     """Show :func:`trouble_lines`."""
     for policy, line in trouble_lines(notes).items():
-        console.print(f"[bold]counted[/bold] {escape(policy)}: {escape(line)}", highlight=False)
+        print_note(console, "counted", f"{policy}: {line}")
 
 
 DRIVEN: Final = "driven"

@@ -58,16 +58,7 @@ def report_of(
     states: Mapping[State, int],
     faults: Sequence[str],
 ) -> LoopReport:
-    """The report of a run.
-
-    Args:
-        words: The command line.
-        run: Server or client after it.
-        periods: Number of periods.
-        packets: By kind.
-        states: By state of the controller.
-        faults: In words.
-    """
+    """The report of a run."""
     return LoopReport(
         **LoopReport.head(words),
         hardware=hardware("cpu"),
@@ -83,12 +74,7 @@ def report_of(
 
 
 def summary_lines(report: LoopReport, unit: str) -> list[str]:
-    """The counts in words; zeros are not shown.
-
-    Args:
-        report: The report.
-        unit: Of its ``states``.
-    """
+    """The counts in words; zeros are not shown."""
     missed = report.overrun + report.skipped
     percent = 100.0 * missed / max(report.periods + report.skipped, 1)
     packets = ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in report.packets.items() if n)

@@ -107,12 +107,7 @@ _DEFAULT_PARENT: Final = Path("runs")
 
 
 class RunFolder:
-    """A training's folder.
-
-    Args:
-        path: Where it is.
-        config: What is trained.
-    """
+    """A training's folder."""
 
     def __init__(self, path: Path, config: TrainingConfig) -> None:
         self.path, self.config = path, config

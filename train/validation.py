@@ -57,11 +57,7 @@ class Score:
 
 
 class Validation:
-    """The validation drives of a training, all in one batch.
-
-    Args:
-        config: The training.
-    """
+    """The validation drives of a training, all in one batch."""
 
     def __init__(self, config: TrainingConfig) -> None:
         self.task = validation_task(config)

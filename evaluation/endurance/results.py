@@ -252,16 +252,13 @@ class EnduranceResults(Headed):
                     name: getattr(drive, name) for name in ("name", "seed", "car", "friction", "machine")
                 }
                 for condition, endured in drive.conditions.items():
-                    yield {"policy": policy, **about, "condition": condition, **_flat(endured)}
+                    values = to_dict(endured)
+                    values |= {f"exceeded_{kind}": n for kind, n in values.pop("exceeded").items()}
+                    yield {"policy": policy, **about, "condition": condition, **values}
 
 
 def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSummary:
-    """Drives in one; at least one.
-
-    Args:
-        drives: The drives.
-        time_step: s.
-    """
+    """Drives in one; at least one."""
     nominal, slower = ([drive.conditions[name] for drive in drives] for name in (NOMINAL, SLOWER))
     both = [*nominal, *slower]
     errors = [float("inf") if one.cue_error is None else one.cue_error for one in slower]
@@ -291,12 +288,6 @@ def by_kind(drives: Sequence[EnduredDrive]) -> dict[str, list[EnduredDrive]]:
     for drive in drives:
         kinds.setdefault(drive.kind, []).append(drive)
     return kinds
-
-
-def _flat(endured: Endured) -> dict[str, Any]:
-    exceeded = {f"exceeded_{kind}": count for kind, count in endured.exceeded.items()}
-    plain = ("samples", "cue_error", "perceived_cue_error", "at_limit", "beyond", "actions_not_finite")
-    return {**{name: getattr(endured, name) for name in plain}, **exceeded}
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
@@ -337,12 +328,7 @@ class EnduranceStore:
         return [seed for seed in seeds if seed not in done]
 
     def keep(self, drives: Collection[EnduredDrive], extremes: Mapping[str, dict[str, float]]) -> None:
-        """Write finished drives at once, whole or not at all.
-
-        Args:
-            drives: The drives.
-            extremes: Of them, by condition.
-        """
+        """Write finished drives at once, whole or not at all."""
         before = self.kept
         merged = {
             condition: before.extremes.get(condition, Extremes()).merged(values)

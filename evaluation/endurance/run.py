@@ -131,12 +131,7 @@ _CHANNELS: Final = (
 
 
 class Watch:
-    """Cue errors and limits of a simulator's drives, a block of time steps at a time.
-
-    Args:
-        simulator: With the drives.
-        platform: The machine, whose limits count.
-    """
+    """Cue errors and limits of a simulator's drives, a block of time steps at a time."""
 
     def __init__(self, simulator: Simulator, platform: Platform) -> None:
         self._simulator, n = simulator, simulator.n
@@ -327,10 +322,6 @@ class EnduranceOutcome:
 
 class EnduranceRun:
     """Drives what is not done yet.
-
-    Args:
-        request: The drives.
-        fresh: Forget what these policies have driven.
 
     Raises:
         MotionCueingError: there is no such policy, or it was not made for the machine.

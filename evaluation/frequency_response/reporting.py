@@ -113,9 +113,9 @@ class SavedResponses(Saved):
     responses: tuple[FrequencyResponse, ...]
 
 
-def save_json(responses: Sequence[FrequencyResponse], arguments: Sequence[str], path: Path) -> None:
+def save_json(responses: Sequence[FrequencyResponse], words: Sequence[str], path: Path) -> None:
     """Write everything, with the command line and the versions that made it."""
-    SavedResponses(SCHEMA, shlex.join(arguments), versions(), tuple(responses)).save_json(path)
+    SavedResponses(SCHEMA, shlex.join(words), versions(), tuple(responses)).save_json(path)
 
 
 def load_json(path: str | Path) -> list[FrequencyResponse]:
@@ -151,8 +151,10 @@ def bode_figure(responses: Sequence[FrequencyResponse]) -> bytes:
             _modulus(grid[row, column], responses, styles, axis, axis, 1.0)
             _phase(grid[row + 1, column], responses, styles, axis)
             if axis not in _inputs(responses):
-                _not_measured(grid[row, column])
-                _not_measured(grid[row + 1, column])
+                for axes in (grid[row, column], grid[row + 1, column]):
+                    place = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+                    axes.text(0.5, 0.5, "not measured", color="#8a8a8a", **place)
+                    axes.set_facecolor("#f5f5f5")
             grid[row, column].set_title(_TITLES[axis])
             grid[row, column].set_ylim(0.01, 4.0)
         for axes in grid[-1]:
@@ -193,11 +195,6 @@ def _inputs(responses: Sequence[FrequencyResponse]) -> list[str]:
     return [axis for axis in CUE_AXES if any(axis in response.inputs for response in responses)]
 
 
-def _not_measured(axes: Axes) -> None:
-    axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center", color="#8a8a8a")
-    axes.set_facecolor("#f5f5f5")
-
-
 def _styles(responses: Sequence[FrequencyResponse]) -> Styles:
     return line_styles([response.policy for response in responses])
 
@@ -209,22 +206,12 @@ def _finish(
     simulated: Collection[str],
     more: str = "",
 ) -> None:
-    """Title and legend.
-
-    Args:
-        figure: With the panels.
-        responses: That are drawn.
-        title: Of the figure.
-        simulated: Policies that have a line somewhere; of the others the legend says why they have none.
-        more: Second line of the title.
-    """
+    """Title and legend, which says of policies without any line (not in ``simulated``) why they have none."""
     about = f"motion base {responses[0].platform}, {amplitudes(responses[0].test.scale)}"
     figure.suptitle(f"{title} ({about})\n{more}".strip(), fontsize=11, x=0.01, ha="left")
     styles = _styles(responses)
     nothing = {"linestyle": ""}
-    handles = [
-        Line2D([], [], **(style if policy in simulated else nothing)) for policy, style in styles.items()
-    ]
+    handles = [Line2D([], [], **(styles[policy] if policy in simulated else nothing)) for policy in styles]
     labels = [policy if policy in simulated else f"{policy}: nothing comes through" for policy in styles]
     columns = max(1, min(len(labels), int(figure.get_figwidth() / 2)))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)

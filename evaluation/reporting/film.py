@@ -107,17 +107,13 @@ def save_film(path: str | Path, frames: Iterable[Picture], rate: float) -> None:
     if first is None:
         raise DataError(f"{path}: a film needs at least one frame")
     if suffix == ".png":
-        write_bytes(path, _png(first))
+        buffer = io.BytesIO()
+        _image(first).save(buffer, format="PNG", optimize=True)
+        write_bytes(path, buffer.getvalue())
     elif suffix == ".gif":
         write_bytes(path, _gif(first, remaining, rate))
     else:
         write_bytes(path, _mp4(first, remaining, rate))
-
-
-def _png(frame: Picture) -> bytes:
-    buffer = io.BytesIO()
-    _image(frame).save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
 
 
 def gif_rate(rate: float) -> float:

@@ -81,10 +81,6 @@ class _NoisyInterface(Interface):
 
     Differences of cues get the difference of their noise. Rows of simulator cues that a model gives, not
     sensors, get none.
-
-    Args:
-        inner: The interface.
-        noise: Of the sensors.
     """
 
     def __init__(self, inner: Interface, noise: SensorNoise) -> None:

@@ -46,13 +46,7 @@ class KeptDrive:
 
 @configuration
 class KeptPair:
-    """The drives of one policy under one condition.
-
-    Args:
-        condition: Name of the condition.
-        policy: Name of the policy.
-        drives: By maneuver.
-    """
+    """The drives of one policy under one condition."""
 
     condition: str
     policy: str

@@ -9,9 +9,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from motion_cueing.cli.arguments import find_platform, find_policies
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.evaluation.benchmark import (
-    BENCHMARK,
     BENCHMARK_POLICIES,
     benchmark,
     benchmark_policies,
@@ -23,7 +23,6 @@ from motion_cueing.evaluation.metrics import METRICS, Criteria, References
 from motion_cueing.evaluation.policies import policy_names
 from motion_cueing.evaluation.reporting.tables import maneuver_table, score_table, suite_table
 from motion_cueing.evaluation.results import Failure, Results
-from motion_cueing.evaluation.selection import find_platform, find_policies
 
 from .examples import GAINS, ORIGIN, results_of
 
@@ -99,7 +98,7 @@ def test_the_benchmark_goes_from_no_motion_to_the_optimum():
 
 def test_benchmark_stands_for_its_policies_among_others():
     platform = find_platform("paper")
-    assert list(find_policies([BENCHMARK, "brk", "classical"], platform)) == [
+    assert list(find_policies(["benchmark", "brk", "classical"], platform)) == [
         *benchmark_policies(policy_names()),
         "brk",
     ]

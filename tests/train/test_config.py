@@ -118,7 +118,7 @@ def test_a_washout_file_under_the_agent_is_kept_in_the_configuration(tmp_path):
         ({"normalize": {"obs": True}}, "unknown field 'normalize.obs'"),
         ({"task": {"action": {"repeat": 0}}}, "'task.action.repeat'"),
         ({"validation": {"best": "speed"}}, "'validation.best'"),
-        ({"algo": "sac"}, "it is for algo sac, but --algo is ppo"),
+        ({"algo": "sac"}, "it is for algo sac, but --algorithm is ppo"),
         ({"search": {"steps": {"low": 3}}}, "give either choices, or low and high"),
     ],
 )

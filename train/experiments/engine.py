@@ -257,11 +257,7 @@ _Manager.register("Mailbox", Mailbox)
 
 
 class ProcessEngine(_Workers):
-    """Jobs in processes of this machine.
-
-    Args:
-        jobs: Processes.
-    """
+    """Jobs in processes of this machine."""
 
     def __init__(self, jobs: int) -> None:
         self._jobs = jobs

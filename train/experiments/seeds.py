@@ -44,12 +44,7 @@ class SeedsPlan:
 
 
 class Seeds:
-    """Trainings that differ in their seed, in folders ``seed-S`` of one folder.
-
-    Args:
-        path: The folder.
-        plan: Which there are.
-    """
+    """Trainings that differ in their seed, in folders ``seed-S`` of one folder."""
 
     def __init__(self, path: Path, plan: SeedsPlan) -> None:
         self.path, self.plan = path, plan

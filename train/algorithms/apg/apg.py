@@ -137,11 +137,7 @@ class ActorOptimizer:
 
 
 class ApgLearner(Learner):
-    """See :class:`~...registry.Learner`.
-
-    Args:
-        config: The training.
-    """
+    """See :class:`~...registry.Learner`."""
 
     def __init__(self, config: TrainingConfig) -> None:
         given = from_dict(ApgHyperparameters, dict(config.hyperparameters), "hyperparameters")

@@ -170,11 +170,7 @@ CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3":
 
 
 class SB3Learner(Learner):
-    """A Stable-Baselines3 model with its environments; see :class:`~...registry.Learner`.
-
-    Args:
-        config: The training.
-    """
+    """A Stable-Baselines3 model with its environments; see :class:`~...registry.Learner`."""
 
     def __init__(self, config: TrainingConfig) -> None:
         torch.set_num_threads(config.threads)
