@@ -54,13 +54,7 @@ class KeptPair:
 
 
 class PairStore:
-    """Keeps the drives of one policy under one condition.
-
-    Args:
-        folder: Of the study; the files lie in ``pairs`` in it.
-        condition: Name of the condition.
-        policy: Name of the policy.
-    """
+    """Keeps the drives of one policy under one condition, in ``pairs`` of the folder of a study."""
 
     def __init__(self, folder: Path, condition: str, policy: str) -> None:
         tag = hashlib.sha256(f"{condition}\n{policy}".encode()).hexdigest()[:6]
@@ -92,18 +86,16 @@ def _files(folder: Path) -> list[Path]:
 
 def check_kept(folder: Path) -> None:
     """Refuse damaged files of drives in the folder of a study, all at once."""
-    damaged = [path for path in _files(folder) if not _readable(path)]
+    damaged = []
+    for path in _files(folder):
+        try:
+            load_drives_done(KeptPair, path, "a study")
+        except DataError:
+            damaged.append(str(path))
     if damaged:
-        names = ", ".join(map(str, damaged))
-        raise DataError(f"{names}: damaged, not the drives of a study; delete them, or add --fresh")
-
-
-def _readable(path: Path) -> bool:
-    try:
-        load_drives_done(KeptPair, path, "a study")
-    except DataError:
-        return False
-    return True
+        raise DataError(
+            f"{', '.join(damaged)}: damaged, not the drives of a study; delete them, or add --fresh"
+        )
 
 
 def identity(given: Any, policy: Policy) -> dict[str, Any]:
