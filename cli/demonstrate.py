@@ -57,7 +57,7 @@ class DemonstrateCommand:
 
 
 def run(command: DemonstrateCommand) -> int:
-    """Record what is not there yet."""
+    """Record the missing drives."""
     from ..evaluation.demonstrations import Demonstrator
 
     check_folder("--out", command.out)

@@ -68,7 +68,7 @@ class EndureCommand:
 
 
 def run(command: EndureCommand) -> int:
-    """Drive what is not done yet, print and write the results."""
+    """Drive the missing drives, print and write the results."""
     from ..evaluation.endurance.run import EnduranceRun
 
     request = _request(command)

@@ -241,7 +241,7 @@ def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
 
 
 def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
-    """The policy, with what is known about it on top."""
+    """The policy, with its origin and scores on top."""
     import yaml
 
     from ..envs.provenance import commit, hardware, now, versions

@@ -37,7 +37,7 @@ BENCHMARK_POLICIES: Final = (
     "optimum-perceived",
     "optimum",
 )
-"""Policies in order: washouts, controllers that see what is now, those that see ahead, and the optimum."""
+"""Policies in order: washouts, controllers without and with preview, and the optimum."""
 
 OLD_COLUMNS: Final = {"share": "normalized_score", "perceived_share": "perceived_normalized_score"}
 """Columns of ``ladder.csv``, the ``benchmark.csv`` of earlier versions, with their names of today."""

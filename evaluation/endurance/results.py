@@ -61,7 +61,7 @@ class Endurance:
     machines: Annotated[int, Field(ge=1)] = 64
 
     def __post_init__(self) -> None:
-        # The ranges are those of an environment, which says what is wrong with them.
+        # The ranges are those of an environment, which checks them.
         assert self.randomization(SLOWER).platforms == self.machines
 
     def randomization(self, condition: str) -> RandomizationOptions:
@@ -310,7 +310,7 @@ class EnduranceStore:
         folder: Of the results.
         policy: Label of the policy.
         key: See :class:`PolicyEndurance`; drives of another key are not taken.
-        fresh: Remove what is kept.
+        fresh: Remove the finished drives.
     """
 
     def __init__(self, folder: Path, policy: str, key: str, fresh: bool = False) -> None:

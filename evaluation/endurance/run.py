@@ -273,7 +273,7 @@ def _alone(plan: Plan) -> CueTrace | None:
 
 
 Progress = Callable[[str, float], None]
-"""Given what is driven, and the seconds of drive done since the last call."""
+"""Called with the policy and condition at hand, and the seconds of drive done since the last call."""
 
 CONDITIONS: Final = (NOMINAL, SLOWER)
 
@@ -321,7 +321,7 @@ class EnduranceOutcome:
 
 
 class EnduranceRun:
-    """Drives what is not done yet.
+    """Drives the missing drives.
 
     Raises:
         MotionCueingError: there is no such policy, or it was not made for the machine.
@@ -349,7 +349,7 @@ class EnduranceRun:
         return drives * len(CONDITIONS) * self._request.endurance.duration
 
     def drive(self, progress: Progress) -> EnduranceOutcome:
-        """Drive until everything is done, or ``progress`` raises :class:`Stopped`; what is done is kept."""
+        """Drive to the end, or until ``progress`` raises :class:`Stopped`; finished drives are on disk."""
         try:
             for drives in self._batches():
                 for label in self._policies:

@@ -45,7 +45,7 @@ class FrequencyTest:
 
     Args:
         frequencies: Of the sinusoids, rad/s.
-        scale: Of all amplitudes: 1 for the test itself, 0.1 or less for what is linear near rest.
+        scale: Of all amplitudes: 1 for the test itself, 0.1 or less for the linear response near rest.
         force: Amplitude of specific force, m/s^2 (ICAO 9625, from memory).
         rate: Largest amplitude of angular velocity, rad/s (1 deg/s; ICAO 9625, from memory).
         attitude: Largest amplitude of attitude, rad, which holds at low frequencies (6 deg; the same).
@@ -154,7 +154,7 @@ def _tilted(angles: Floats) -> Floats:
 def harmonic(signal: Floats, frequency: float, dt: float) -> tuple[NDArray[np.complex128], Floats]:
     """The sinusoid in signals over whole periods, and how much of them it explains.
 
-    A line is taken out first, as a least-squares fit together with the sinusoid: what is left of a slow start
+    A line is taken out first, as a least-squares fit together with the sinusoid: the rest of a slow start
     is nearly one.
 
     Args:
@@ -181,7 +181,7 @@ def harmonic(signal: Floats, frequency: float, dt: float) -> tuple[NDArray[np.co
 Complexes = NDArray[np.complex128]
 
 SILENCE: Final = 1e-6
-"""Modulus, in SI units, below which nothing comes through: what is left is rounding, which has no phase."""
+"""Modulus, in SI units, below which nothing comes through: the rest is rounding, which has no phase."""
 
 
 @configuration

@@ -152,7 +152,7 @@ def test_a_file_that_is_no_configuration_is_refused(text, tmp_path):
 def test_an_unknown_algorithm_is_told_with_the_near_ones():
     with pytest.raises(UnknownNameError, match=r"unknown algorithm 'pp'\. Did you mean ppo"):
         load_config("pp")
-    with pytest.raises(ConfigurationError, match="--algo is missing; use one of ppo"):
+    with pytest.raises(ConfigurationError, match="--algorithm is missing; use one of ppo"):
         load_config(None)
 
 

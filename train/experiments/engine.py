@@ -62,7 +62,7 @@ class Job(Protocol):
         ...
 
     def run(self, report: Report) -> Any:
-        """Do it, or what is left of it."""
+        """Do the work, or the rest of it."""
         ...
 
 

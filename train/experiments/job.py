@@ -29,7 +29,7 @@ class TrainingJob:
 
     Args:
         name: For people.
-        path: The folder, absolute; the training goes on from what is in it. The one above it exists.
+        path: The folder, absolute; a training in it goes on. Its parent exists.
         config: The training.
         until: Actions after which it pauses with a checkpoint; None for its end.
         parent: Folder of the training whose last checkpoint it starts from; None to begin anew.

@@ -89,7 +89,7 @@ def _set(values: dict[str, Any], path: str, value: Any) -> None:
 
 
 class Search:
-    """A search in its folder; what is there already counts.
+    """A search in its folder; finished trials count.
 
     Args:
         path: The folder.

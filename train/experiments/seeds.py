@@ -74,7 +74,7 @@ class Seeds:
         return [TrainingJob(f"seed-{c.seed}", folder / f"seed-{c.seed}", c) for c in configs]
 
     def run(self, engine: Engine, listener: Listener) -> tuple[list[float], bool]:
-        """Train; what is done already stays.
+        """Train; finished trainings stay as they are.
 
         Returns:
             What the configuration calls best of each seed's best agent, and whether Ctrl-C stopped them.
@@ -234,7 +234,7 @@ def run_training(folder: RunFolder, place: Place) -> int:
 
 
 def report_training(folder: RunFolder, outcome: Outcome, words: str = "") -> int:
-    """Say what came of a training; returns the exit status."""
+    """Print the result of a training; returns the exit status."""
     steps = outcome.status.steps
     if outcome.interrupted:
         return _stopped(f"train --out {folder.path}{words}", f" after {steps:,} steps")

@@ -3,7 +3,7 @@
 A round: drive a window in every environment with the policy (:class:`.backpropagation.Rollout`), lead the
 gradient of its cost back through time to the actions and on to the weights, take a step of the optimizer. No
 action is ever sampled. A window is a whole episode, or shorter; the next one then goes on where it ended,
-and a learned value can stand for what is still to come (:mod:`.value`; the short-horizon actor-critic,
+and a learned value can stand for the later cost (:mod:`.value`; the short-horizon actor-critic,
 SHAC).
 """
 
@@ -229,7 +229,7 @@ class ApgLearner(Learner):
         self._logged += 1
 
     def scalars(self) -> dict[str, float]:
-        """Means since the last call, and what was skipped since the start for not being finite."""
+        """Means since the last call, and counts of skipped rounds and episodes, which were not finite."""
         means = {name: total / self._logged for name, total in self._sums.items()}
         self._sums, self._logged = {}, 0
         skipped = {

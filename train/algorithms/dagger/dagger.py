@@ -41,7 +41,7 @@ _YAW = 2
 class Teacher:
     """A controller that labels the states of a batch of episodes, which it may or may not drive.
 
-    A controller that knows its drive is given what is left of it where the episode begins.
+    A controller that knows its drive is given the rest of it where the episode begins.
 
     Args:
         policy: Its name, or the YAML file of one.
