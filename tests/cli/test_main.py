@@ -378,7 +378,7 @@ def test_an_output_folder_that_is_a_file_is_refused(tmp_path, capsys):
 def test_list_shows_every_kind(capsys):
     assert main(["list"]) == 0
     shown = capsys.readouterr().out
-    for name in ("no-motion", "steady-turn", "city-drive", "paper", "sedan"):
+    for name in ("no-motion", "steady-turn", "city-drive", "paper", "sedan", "dagger"):
         assert name in shown
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from motion_cueing.cli.arguments import find_platform, find_policies
-from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.evaluation.benchmark import (
     BENCHMARK_POLICIES,
     benchmark,
@@ -102,7 +102,7 @@ def test_benchmark_stands_for_its_policies_among_others():
         *benchmark_policies(policy_names()),
         "brk",
     ]
-    with pytest.raises(ConfigurationError, match="it is called 'benchmark' now"):
+    with pytest.raises(UnknownNameError, match="it is called 'benchmark' now"):
         find_policies(["ladder"], platform)
 
 
