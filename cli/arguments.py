@@ -41,10 +41,10 @@ def option(metavar: str, **others: Any) -> Parameter:
 
     Args:
         metavar: What stands for its value in the help.
-        **others: More about it, as Cyclopts has it; what its version for Python 3.10, 4, lacks is left out.
+        **others: More about it, as Cyclopts has it; its version 4, for Python 3.10, lacks some.
     """
-    wanted = {"metavar": metavar, **others}
-    return Parameter(**{name: value for name, value in wanted.items() if hasattr(Parameter, name)})
+    options = {"metavar": metavar, **others}
+    return Parameter(**{name: value for name, value in options.items() if hasattr(Parameter, name)})
 
 
 def several(metavar: str, **others: Any) -> Parameter:
@@ -127,15 +127,15 @@ def find_platforms(names: Sequence[str], ablations: bool = False) -> dict[str, P
     from ..envs import platform
 
     named = [name for given in names for name in (platform.platform_names() if given == ALL else [given])]
-    found: dict[str, Platform] = {}
+    machines: dict[str, Platform] = {}
     for name in dict.fromkeys(named):
         machine = find_platform(name)
         for one in [machine, *(platform.ablations(machine) if ablations else ())]:
-            if found.setdefault(one.name, one) != one:
+            if machines.setdefault(one.name, one) != one:
                 raise ConfigurationError(
                     f"two motion bases have the name {one.name!r}; rename one in its file"
                 )
-    return found
+    return machines
 
 
 def find_car(name: str) -> Car:
@@ -173,7 +173,7 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
 def make_policies(
     names: Sequence[str], platform: Platform, make: Callable[[str, Platform], Any] | None = None
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """Policies by label, and the reasons why rows of the benchmark are left out on this machine.
+    """Policies by label, and the reasons why policies of the benchmark are skipped on this machine.
 
     Args:
         names: Names, files and references.
@@ -181,7 +181,7 @@ def make_policies(
         make: Makes a policy, and refuses one that is of no use.
 
     Raises:
-        MotionCueingError: a policy that is asked for by its own name cannot be made.
+        MotionCueingError: a policy named by the user cannot be made.
     """
     policies: dict[str, Any] = {}
     skipped: dict[str, str] = {}
@@ -214,9 +214,9 @@ def find_maneuvers(names: Sequence[str], car: Car) -> dict[str, CueSource]:
     maneuvers, recordings = maneuver_names(), recording_names()
     known = [*maneuvers, *recordings]
     expanded = [name for given in names for name in (known if given == ALL else [given])]
-    found = labels(expanded, [_stem("maneuver", name, [*known, ALL]) for name in expanded])
+    by_name = labels(expanded, [_stem("maneuver", name, [*known, ALL]) for name in expanded])
     sources: dict[str, CueSource] = {}
-    for name, label in found.items():
+    for name, label in by_name.items():
         if name in maneuvers:
             sources[label] = partial(get_maneuver(name).drive, car)
         elif name in recordings:

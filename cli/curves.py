@@ -42,12 +42,7 @@ class CurvesCommand:
 
 
 def run(command: CurvesCommand) -> int:
-    """Draw, and print where each training ended.
-
-    Raises:
-        ConfigurationError: no folder, another kind of picture, or a scalar that no log has.
-        DataError: a log is missing or broken.
-    """
+    """Draw, and print where each training ended."""
     from ..evaluation.reporting.figures import styled
 
     if command.out.suffix not in _SUFFIXES:
@@ -67,12 +62,7 @@ def run(command: CurvesCommand) -> int:
 
 
 def read_curve(folder: Path, scalar: str) -> Curve:
-    """Steps and values of a scalar in the log of a training.
-
-    Raises:
-        UnknownNameError: the log has no such scalar.
-        DataError: there is no log, or it is broken.
-    """
+    """Steps and values of a scalar in the log of a training."""
     from ..train.logs import STEPS, read_log
 
     rows = read_log(folder)

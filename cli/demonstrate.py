@@ -57,11 +57,7 @@ class DemonstrateCommand:
 
 
 def run(command: DemonstrateCommand) -> int:
-    """Record what is not there yet.
-
-    Raises:
-        MotionCueingError: an argument is wrong, or the folder holds another recording.
-    """
+    """Record the missing drives."""
     from ..evaluation.demonstrations import Demonstrator
 
     check_folder("--out", command.out)
@@ -88,10 +84,10 @@ def _is_done(folder: Path, index: Index, name: str, cues: CueTrace) -> bool:
     """Whether the drive of a name is there, and is of these cues; says so if it is of others."""
     from ..train.algorithms.dagger.demonstrations import is_kept
 
-    kept = next((entry for entry in index.drives if entry.name == name), None)
-    if kept is None or not is_kept(folder, kept):
+    recorded = next((entry for entry in index.drives if entry.name == name), None)
+    if recorded is None or not is_kept(folder, recorded):
         return False
-    if kept.cues != cues.digest():
+    if recorded.cues != cues.digest():
         print(f"{name}: its cues are not those that were recorded; recorded anew")
         return False
     return True
@@ -148,11 +144,7 @@ def _setting(command: DemonstrateCommand, demonstrator: Demonstrator) -> dict[st
 
 
 def _index(command: DemonstrateCommand, setting: dict[str, Any]) -> Index:
-    """The folder's index, or a new one; with ``--fresh`` the drives of the old one are removed.
-
-    Raises:
-        ConfigurationError: the folder holds drives of another controller, car or motion base.
-    """
+    """The folder's index, or a new one; with ``--fresh`` the drives of the old one are removed."""
     from ..envs.provenance import command_line, commit, hardware, now, versions
     from ..train.algorithms.dagger.demonstrations import INDEX, Index, load_index
 
@@ -186,7 +178,7 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
     from ..train.algorithms.dagger.demonstrations import DriveEntry, save_drive
 
     record, drive = demonstrate(demonstrator, name, cues)
-    found = measure(record)
+    metrics = measure(record)
     file = f"{name}.npz"
     return DriveEntry(
         name=name,
@@ -195,9 +187,9 @@ def _record(folder: Path, name: str, cues: CueTrace, demonstrator: Demonstrator)
         source=cues.source,
         cues=cues.digest(),
         steps=len(drive),
-        cue_error=found.cue_error,
-        perceived_cue_error=found.perceived_cue_error,
-        at_limit=found.at_limit,
+        cue_error=metrics.cue_error,
+        perceived_cue_error=metrics.perceived_cue_error,
+        at_limit=metrics.at_limit,
         notes=statistics_of(record.metadata),
     )
 

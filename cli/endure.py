@@ -68,26 +68,22 @@ class EndureCommand:
 
 
 def run(command: EndureCommand) -> int:
-    """Drive what is not done yet, print and write what came of it all.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Drive the missing drives, print and write the results."""
     from ..evaluation.endurance.run import EnduranceRun
 
-    asked = _asked(command)
-    driving = EnduranceRun(asked, command.fresh)
+    request = _request(command)
+    driving = EnduranceRun(request, command.fresh)
     with _progress(driving.seconds) as tell:
-        found = driving.drive(tell)
-    results = _results(command, asked, found)
-    _write(command, asked, results)
-    _print(command, results, found)
-    if not found.finished:
+        outcome = driving.drive(tell)
+    results = _results(command, request, outcome)
+    _write(command, request, results)
+    _print(command, results, outcome)
+    if not outcome.finished:
         return _INTERRUPTED
     return _WITHSTOOD if all(one.withstood for one in results.summaries.values()) else _FAILED
 
 
-def _asked(command: EndureCommand) -> EnduranceRequest:
+def _request(command: EndureCommand) -> EnduranceRequest:
     from ..envs.maneuvers import drive_seeds
     from ..evaluation.endurance.run import EnduranceRequest
 
@@ -136,23 +132,25 @@ def _progress(seconds: float) -> Iterator[Progress]:
         yield tell
 
 
-def _results(command: EndureCommand, asked: EnduranceRequest, found: EnduranceOutcome) -> EnduranceResults:
+def _results(
+    command: EndureCommand, request: EnduranceRequest, outcome: EnduranceOutcome
+) -> EnduranceResults:
     from ..envs.simulator.simulator import TIME_STEP
     from ..evaluation.endurance.results import EnduranceResults, summarized
     from ..evaluation.reporting.text import words_of
 
-    driven = {name: one for name, one in found.policies.items() if one.drives}
+    driven = {name: one for name, one in outcome.policies.items() if one.drives}
     return EnduranceResults(
         **EnduranceResults.head(words_of("endure", command)),
-        platform=asked.platform.name,
-        endurance=asked.endurance,
-        finished=found.finished,
+        platform=request.platform.name,
+        endurance=request.endurance,
+        finished=outcome.finished,
         summaries={name: summarized(one.drives, TIME_STEP) for name, one in driven.items()},
         policies=driven,
     )
 
 
-def _write(command: EndureCommand, asked: EnduranceRequest, results: EnduranceResults) -> None:
+def _write(command: EndureCommand, request: EnduranceRequest, results: EnduranceResults) -> None:
     from ..evaluation.endurance.results import tables
     from ..evaluation.endurance.run import seeded_drives
     from ..evaluation.reporting.text import save_markdown
@@ -160,23 +158,23 @@ def _write(command: EndureCommand, asked: EnduranceRequest, results: EnduranceRe
     results.save_json(command.out / "endurance.json")
     results.save_csv(command.out / "endurance.csv")
     save_markdown(command.out / "endurance.md", *tables(results))
-    for drive in seeded_drives(asked.endurance, command.seeds):
+    for drive in seeded_drives(request.endurance, command.seeds):
         drive.cues.to_csv(command.out / f"{drive.cues.name}.csv")
 
 
-def _print(command: EndureCommand, results: EnduranceResults, found: EnduranceOutcome) -> None:
+def _print(command: EndureCommand, results: EnduranceResults, outcome: EnduranceOutcome) -> None:
     from ..evaluation.endurance.results import tables
     from ..evaluation.reporting.text import how_many, print_table, table_console
 
     console = table_console()
     for table in tables(results):
         print_table(console, table)
-    if found.skipped:
-        told = how_many(len(found.skipped), "drive")
-        console.print(f"{told} skipped: the car left the range of its model", highlight=False)
-    state = "" if found.finished else "interrupted, the same command goes on; "
+    if outcome.skipped:
+        drives = how_many(len(outcome.skipped), "drive")
+        console.print(f"{drives} skipped: the car left the range of its model", highlight=False)
+    state = "" if outcome.finished else "interrupted, the same command goes on; "
     console.print(
-        f"{state}{how_many(found.driven, 'drive')} driven now; everything is in {command.out}",
+        f"{state}{how_many(outcome.driven, 'drive')} driven now; everything is in {command.out}",
         highlight=False,
         markup=False,
     )

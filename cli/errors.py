@@ -1,4 +1,4 @@
-"""What is wrong with arguments, in one sentence: the option, the value found, and how to mend it."""
+"""Errors of arguments in one sentence: the option, its value, and how to mend it."""
 
 from __future__ import annotations
 
@@ -45,12 +45,7 @@ OLD_FLAGS: Final[Mapping[str, Mapping[str, str]]] = {
 
 
 def complaint(command: str, error: CycloptsError) -> ConfigurationError:
-    """What the parser found, as a sentence.
-
-    Args:
-        command: Name of the command.
-        error: The parser's.
-    """
+    """The parser's error as a sentence."""
     return ConfigurationError(f"{_sentence(command, error)} See `motion-cueing {command} --help`")
 
 
@@ -96,7 +91,7 @@ def _unknown(command: str, flag: str, flags: list[str]) -> str:
 
 
 def _missing(command: str, error: MissingArgumentError, argument: Argument) -> str:
-    """A value that is missing; an option that does not exist is told before, for it may have been meant."""
+    """A value that is missing; an unknown option is reported first, for it may have been meant."""
     if error.keyword is not None:
         if _length(argument.hint) == 1:
             return f"{argument.name} needs a value after it."

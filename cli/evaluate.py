@@ -1,4 +1,4 @@
-"""``motion-cueing evaluate``: every policy on every maneuver, with tables, figures and a report."""
+"""``motion-cueing evaluate``, ``benchmark`` and ``paper``: drives, with tables, figures and a report."""
 
 from __future__ import annotations
 
@@ -40,6 +40,32 @@ class EvaluateCommand:
     out: OutFolder = Path("results")
 
 
+@dataclass(frozen=True, kw_only=True)
+class BenchmarkCommand:
+    """Evaluate every controller of the benchmark, and rank them over all maneuvers.
+
+    Writes what `motion-cueing evaluate` writes. A controller that cannot drive the motion base is skipped.
+    The optimum takes minutes a drive. Policies of your own are driven beside the benchmark with
+    `--policies benchmark mine.yaml`.
+    """
+
+    policies: PolicyNames = (BENCHMARK,)
+    maneuvers: ManeuverNames = (ALL,)
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
+    out: OutFolder = Path("benchmark")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperCommand:
+    """Drive the six cases of the paper, draw its figures, and check each of its numbers.
+
+    Writes paper.json, paper.html, the figures and the trajectories. The exit status is 1 if a number fails.
+    """
+
+    out: OutFolder = Path("paper")
+
+
 @dataclass(frozen=True)
 class Plan:
     """An evaluation, all names resolved.
@@ -47,10 +73,8 @@ class Plan:
     Args:
         maneuvers: Sources of cues by label.
         policies: Drives by label.
-        platform: The motion base.
-        car: The car.
         out: Folder of the output.
-        arguments: The command line that asks for it.
+        arguments: The command line.
         skipped: Policies of the benchmark that cannot be driven here, and why.
     """
 
@@ -87,14 +111,27 @@ class _Output:
 
 
 def run(command: EvaluateCommand) -> int:
-    """Evaluate; the exit status is 1 if a drive failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Evaluate; the exit status is 1 if a drive failed."""
     from ..evaluation.reporting.text import words_of
 
     return report(make_plan(command, words_of("evaluate", command)), BENCHMARK in command.policies)
+
+
+def run_benchmark(command: BenchmarkCommand) -> int:
+    """Evaluate the benchmark; the exit status is 1 if a drive failed."""
+    from ..evaluation.reporting.text import words_of
+
+    plan = make_plan(EvaluateCommand(**vars(command)), words_of("benchmark", command))
+    return report(plan, ranked=True)
+
+
+def run_paper(command: PaperCommand) -> int:
+    """Reproduce the paper; the exit status is 1 if a number fails."""
+    check_folder("--out", command.out)
+    check_own_json("--out", command.out / "paper.json", frozenset({"schema", "checks"}))
+    from ..evaluation.paper.cases import run as reproduce
+
+    return reproduce(command.out)
 
 
 def report(plan: Plan, ranked: bool) -> int:
@@ -126,11 +163,6 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     Args:
         command: Its arguments.
         words: The command line, program first.
-
-    Raises:
-        UnknownNameError: a name is not registered.
-        ConfigurationError: a YAML file has a wrong field.
-        DataError: a file is missing or broken.
     """
     from ..evaluation.suite import DRIVEN, cue_sources, load_drives
 

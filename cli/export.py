@@ -28,38 +28,30 @@ class ExportCommand:
 
 
 def run(command: ExportCommand) -> int:
-    """Export, and print what was found.
-
-    Raises:
-        MotionCueingError: an argument is wrong, a package is missing, or the network computes something else.
-    """
+    """Export, and print accuracy, size and speed."""
     if command.out.suffix != ".onnx":
         raise ConfigurationError(f"--out {command.out}: name a file that ends in .onnx")
     check_file("--out", command.out)
     agent = _agent(command.policy)
     from ..train.agents.export import CHECKED, export_onnx
 
-    found = export_onnx(agent, command.out)
+    exported = export_onnx(agent, command.out)
     network = agent.network
-    print(f"{command.out}: {agent.name}, {found.size / 1024:.0f} KiB")
+    print(f"{command.out}: {agent.name}, {exported.size / 1024:.0f} KiB")
     print(f"observation (n, {network.size}) float32, action (n, {network.action_size}) in [-1, 1]")
     print(
-        f"largest difference over {CHECKED:,} observations: {found.torch_difference:.1e} from PyTorch, "
-        f"{found.numpy_difference:.1e} from NumPy"
+        f"largest difference over {CHECKED:,} observations: {exported.torch_difference:.1e} from PyTorch, "
+        f"{exported.numpy_difference:.1e} from NumPy"
     )
     print(
-        f"one observation, one thread: mean {1e6 * found.mean:.1f} us, p99 {1e6 * found.p99:.1f} us, "
-        f"max {1e6 * found.longest:.1f} us"
+        f"one observation, one thread: mean {1e6 * exported.mean:.1f} us, p99 {1e6 * exported.p99:.1f} us, "
+        f"max {1e6 * exported.longest:.1f} us"
     )
     return 0
 
 
 def _agent(name: str) -> Agent:
-    """The agent of a name or file.
-
-    Raises:
-        MotionCueingError: it is another kind of policy, or there is none.
-    """
+    """The agent of a name or file."""
     from ..evaluation.policies import find_agent, is_agent, policy_names
     from ..train.agents import agent_names
 

@@ -61,15 +61,9 @@ class Measured:
 
 
 def run(command: FrequencyResponseCommand) -> int:
-    """Measure, print and write; the exit status is 1 if a policy's test failed.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
-    from rich.markup import escape
-
+    """Measure, print and write; the exit status is 1 if a policy's test failed."""
     from ..evaluation.frequency_response.reporting import response_table
-    from ..evaluation.reporting.text import print_table, table_console
+    from ..evaluation.reporting.text import print_note, print_table, table_console
 
     measured = measure_all(command)
     console = table_console()
@@ -78,12 +72,12 @@ def run(command: FrequencyResponseCommand) -> int:
     for response in measured.responses:
         print_table(console, response_table(response))
     for policy, reason in measured.skipped.items():
-        console.print(f"[bold]skipped[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
+        print_note(console, "skipped", f"{policy}: {reason}")
     for policy, reason in measured.failed.items():
-        console.print(f"[bold red]failed[/bold red] {escape(policy)}: {escape(reason)}", highlight=False)
+        print_note(console, "failed", f"{policy}: {reason}")
     if measured.responses:
-        told = f"Every axis to every axis is in {command.out}: bode.png, matrix.png, frequency-response.csv"
-        console.print(told, highlight=False, markup=False)
+        where = f"Every axis to every axis is in {command.out}: bode.png, matrix.png, frequency-response.csv"
+        console.print(where, highlight=False, markup=False)
     return 1 if measured.failed else 0
 
 
@@ -98,11 +92,7 @@ def _save(responses: list[FrequencyResponse], command: FrequencyResponseCommand)
 
 
 def measure_all(command: FrequencyResponseCommand) -> Measured:
-    """The response of each policy, once all arguments are checked.
-
-    Raises:
-        MotionCueingError: an argument is wrong, or a policy that is asked for by its name cannot be tested.
-    """
+    """The response of each policy, once all arguments are checked."""
     from ..evaluation.frequency_response.response import frequency_response
     from ..evaluation.suite import explain
 
@@ -111,17 +101,17 @@ def measure_all(command: FrequencyResponseCommand) -> Measured:
     check_own_json("--out", command.out / "frequency-response.json", frozenset({"schema", "responses"}))
     platform = find_platform(command.platform)
     policies, skipped = make_policies(command.policies, platform, _testable)
-    found = Measured(skipped=skipped)
+    measured = Measured(skipped=skipped)
     with drives_progress(len(policies) * len(test.frequencies)) as advance:
         for label, policy in policies.items():
             # A policy is a user's code: whatever it raises must not cost what was measured before.
             try:
                 response = frequency_response(policy, platform, test, axes, _telling(advance, label))
             except Exception as error:
-                found.failed[label] = explain(error)
+                measured.failed[label] = explain(error)
             else:
-                found.responses.append(replace(response, policy=label))
-    return found
+                measured.responses.append(replace(response, policy=label))
+    return measured
 
 
 def _testable(name: str, platform: Platform) -> Any:

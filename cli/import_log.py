@@ -1,11 +1,12 @@
-"""``motion-cueing import``: a log of a drive becomes cues, with a picture of what was found."""
+"""``motion-cueing import``: a log of a drive becomes cues, with a picture of the estimates."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
+import numpy as np
 from cyclopts import Parameter
 
 from ..envs.errors import ConfigurationError
@@ -13,8 +14,17 @@ from ..envs.logs.columns import ImportOptions, parse_columns
 from ..envs.storage import check_file, write_bytes
 from .arguments import Whole, option, several
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..envs.cues import Floats
+    from ..envs.logs.importer import ImportedLog
+
 _MOST_DECIMALS: Final = 15
 """More digits than a double has are noise."""
+_WINDOW_S: Final = 20.0
+"""Length of a window of the spectra: resolves 0.05 Hz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +32,7 @@ class ImportCommand:
     """Turn a log of a drive into cues.
 
     Estimates from the record itself how the device sat in the car (gravity, dv/dt against the
-    forward axis, v r against the lateral one, course against yaw rate), and prints what it found.
+    forward axis, v r against the lateral one, course against yaw rate), and prints the findings.
     """
 
     file: Annotated[Path, option("LOG")] = field(kw_only=False)
@@ -42,11 +52,7 @@ class ImportCommand:
 
 
 def run(command: ImportCommand) -> int:
-    """Convert, write, and print the findings.
-
-    Raises:
-        MotionCueingError: the log or an argument is wrong.
-    """
+    """Convert, write, and print the findings."""
     if command.decimals is not None and not 0 <= command.decimals <= _MOST_DECIMALS:
         raise ConfigurationError(f"decimals is {command.decimals}; use 0 to {_MOST_DECIMALS}")
     if command.out.resolve() == command.file.resolve():
@@ -63,8 +69,6 @@ def run(command: ImportCommand) -> int:
     print("\n".join(imported.findings.lines()))
     print(f"{command.out}: {len(imported.trace)} samples, {imported.trace.duration:.1f} s")
     if command.plot is not None:
-        from .import_figure import import_plot
-
         write_bytes(command.plot, import_plot(imported))
         print(f"{command.plot}: picture")
     return 0
@@ -76,3 +80,85 @@ def _check_plot(plot: Path, command: ImportCommand) -> None:
     if plot.resolve() in (command.file.resolve(), command.out.resolve()):
         raise ConfigurationError(f"--plot {plot} is the log or the cues; name another file")
     check_file("--plot", plot)
+
+
+def import_plot(imported: ImportedLog) -> bytes:
+    """PNG with the cues against the car's own motion, the raw signals, and spectra before and after."""
+    from ..evaluation.reporting.figures import new_figure, png, styled
+
+    with styled():
+        figure = new_figure(12.0, 11.0)
+        figure.suptitle(f"{imported.trace.name}: findings of the import")
+        _draw(figure, imported)
+        return png(figure)
+
+
+def _draw(figure: Figure, imported: ImportedLog) -> None:
+    from ..envs.cues import GRAVITY
+    from ..envs.logs.mounting import SMOOTHING_HZ
+    from ..envs.logs.timing import low_pass
+
+    axes = figure.subplots(4, 2)
+    trace = imported.trace
+    rate_hz = 1.0 / trace.dt
+    speed = trace.channels.get("speed_m_s")
+    along = None if speed is None else np.gradient(low_pass(speed, rate_hz, SMOOTHING_HZ), trace.dt)
+    across = None if speed is None else speed * trace.angular_velocity[:, 2]
+    _compare(axes[0, 0], trace.time, trace.specific_force[:, 0], along, ("f_x", "dv/dt"))
+    _compare(axes[1, 0], trace.time, trace.specific_force[:, 1], across, ("f_y", "v r"))
+    _scatter(axes[0, 1], trace.specific_force[:, 0], along, ("f_x", "dv/dt"), rate_hz)
+    _scatter(axes[1, 1], trace.specific_force[:, 1], across, ("f_y", "v r"), rate_hz)
+    rest = np.full(len(trace), -GRAVITY)
+    _compare(axes[2, 0], trace.time, trace.specific_force[:, 2], rest, ("f_z", "at rest"))
+    _lines(axes[2, 1], trace.time, np.degrees(trace.angular_velocity), ("p", "q", "r"), "rates, deg/s")
+    _lines(axes[3, 0], trace.time, imported.raw_force, ("x", "y", "z"), "raw, device axes, m/s²")
+    _spectra(axes[3, 1], imported)
+
+
+def _compare(
+    axes: Axes, time: Floats, measured: Floats, expected: Floats | None, names: tuple[str, str]
+) -> None:
+    axes.plot(time, measured, linewidth=0.7, label=names[0])
+    if expected is not None:
+        axes.plot(time, expected, label=names[1])
+    axes.set(xlabel="time, s", ylabel="m/s²")
+    axes.legend(ncols=2)
+
+
+def _scatter(
+    axes: Axes, measured: Floats, expected: Floats | None, names: tuple[str, str], rate_hz: float
+) -> None:
+    from ..envs.logs.mounting import SMOOTHING_HZ, correlation
+    from ..envs.logs.timing import low_pass
+
+    if expected is None:
+        axes.text(0.5, 0.5, "no speed in the log", ha="center", va="center")
+        return
+    smooth_measured, smooth = (low_pass(values, rate_hz, SMOOTHING_HZ) for values in (measured, expected))
+    span = np.array([smooth.min(), smooth.max()])
+    axes.plot(smooth, smooth_measured, ".", markersize=1.0)
+    axes.plot(span, span, color="#444444", linewidth=0.8)
+    axes.set(xlabel=f"{names[1]}, m/s²", ylabel=f"{names[0]}, m/s²")
+    note = f"below {SMOOTHING_HZ:g} Hz: correlation {correlation(smooth_measured, smooth):.2f}"
+    axes.set_title(note, loc="right", fontweight="normal")
+
+
+def _lines(axes: Axes, time: Floats, values: Floats, names: tuple[str, str, str], label: str) -> None:
+    for name, column in zip(names, values.T, strict=True):
+        axes.plot(time, column, linewidth=0.7, label=name)
+    axes.set(xlabel="time, s", ylabel=label)
+    axes.legend(ncols=3)
+
+
+def _spectra(axes: Axes, imported: ImportedLog) -> None:
+    from scipy.signal import welch
+
+    rate_hz = 1.0 / imported.trace.dt
+    window = min(len(imported.trace), int(_WINDOW_S * rate_hz))
+    for name, values in (("raw", imported.raw_force), ("converted", imported.trace.specific_force)):
+        # The trace of the spectral matrix does not depend on the axes, so raw and converted compare.
+        frequency, density = welch(values - values.mean(axis=0), fs=rate_hz, nperseg=window, axis=0)
+        axes.loglog(frequency[1:], density.sum(axis=1)[1:], label=name)
+    axes.set(xlabel="frequency, Hz", ylabel="force, (m/s²)²/Hz")
+    axes.set_ylim(bottom=1e-8)
+    axes.legend(ncols=2)

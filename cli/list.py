@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class ListCommand:
-    """Show every name that a command accepts: policies, maneuvers, motion bases and cars."""
+    """Show every name that a command accepts: policies, maneuvers, motion bases, cars and algorithms."""
 
 
 def run(command: ListCommand) -> int:
@@ -33,6 +33,7 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
     from .. import baselines as policies
     from ..envs import car, maneuvers, platform
     from ..train import agents  # noqa: F401  (registers them)
+    from ..train.registry import ALGORITHMS
 
     kinds = [
         ("Policies", policies.policy_names(), policies.describe_policy),
@@ -44,5 +45,6 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
             platform.describe_platform,
         ),
         ("Cars", car.car_names(), car.describe_car),
+        ("Training algorithms", ALGORITHMS.names(), ALGORITHMS.description),
     ]
     return [(title, [(name, describe(name)) for name in names]) for title, names, describe in kinds]

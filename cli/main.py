@@ -1,7 +1,8 @@
 """The command line ``motion-cueing``: its commands, their help, exit status, and one line for what is wrong.
 
-A command is a dataclass of arguments and a ``run`` in a module of its own. Such a module imports its
-libraries within ``run``, so that help and complaints come at once.
+A command is a dataclass of its arguments and a function, which returns the exit status and raises a
+``MotionCueingError`` where an argument or a file is wrong, before anything is driven or written. Modules of
+commands import libraries within functions, so that help and complaints come at once.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ class Command:
         afterwards: What to do next.
         goes_on: Whether the same command goes on where it was stopped.
         announces: Whether the compilation of kernels is announced while it runs.
+        run: Name of the function in the module that does the work.
     """
 
     module: str
@@ -50,6 +52,7 @@ class Command:
     afterwards: str
     goes_on: bool = False
     announces: bool = True
+    run: str = "run"
 
 
 COMMANDS: Final[Mapping[str, Command]] = {
@@ -61,23 +64,25 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "open report.html in --out; `motion-cueing render` shows a drive",
     ),
     "benchmark": Command(
-        ".benchmark",
+        ".evaluate",
         "BenchmarkCommand",
         "evaluate every controller of the benchmark, from no motion to the optimum",
         "--maneuvers lane-change --out benchmark",
-        "open report.html in --out; ladder.md has the table",
+        "open report.html in --out; benchmark.md has the table",
+        run="run_benchmark",
     ),
     "paper": Command(
-        ".paper",
+        ".evaluate",
         "PaperCommand",
         "reproduce the paper's six cases, with a pass or a fail for each number",
         "--out paper",
         "open paper.html in --out",
+        run="run_paper",
     ),
     "list": Command(
         ".list",
         "ListCommand",
-        "show the names of policies, maneuvers, motion bases and cars",
+        "show the names of policies, maneuvers, motion bases, cars and algorithms",
         "",
         "`motion-cueing evaluate --policies NAME ...` drives with them",
     ),
@@ -112,20 +117,22 @@ COMMANDS: Final[Mapping[str, Command]] = {
         goes_on=True,
     ),
     "search": Command(
-        ".search",
+        ".train",
         "SearchCommand",
         "search for an algorithm's best hyperparameters",
         "--config search.yaml --trials 50 --steps 1e5 --out runs/search",
         "`motion-cueing train --config runs/search/best.yaml` trains with the best",
         goes_on=True,
+        run="run_search",
     ),
     "population": Command(
-        ".population",
+        ".train",
         "PopulationCommand",
         "train a population whose worst go on from its best",
         "--config population.yaml --members 8 --out runs/population",
         "`motion-cueing evaluate --policies runs/population/best.safetensors` compares the best agent",
         goes_on=True,
+        run="run_population",
     ),
     "curves": Command(
         ".curves",
@@ -142,20 +149,22 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "look at bode.png in --out",
     ),
     "compare": Command(
-        ".compare",
+        ".studies",
         "CompareCommand",
         "drive on several machines: how much does a controller need?",
         "--platforms paper 24-inch --policies classical mpc --out comparison",
         "look at study.png and study.md in --out",
         goes_on=True,
+        run="run_compare",
     ),
     "robustness": Command(
-        ".robustness",
+        ".studies",
         "RobustnessCommand",
         "drive with lag, delay, noise, another car, and faster",
         "--policies classical learned --maneuvers slalom --out robustness",
         "look at study.png and study.md in --out",
         goes_on=True,
+        run="run_robustness",
     ),
     "endure": Command(
         ".endure",
@@ -182,12 +191,13 @@ COMMANDS: Final[Mapping[str, Command]] = {
         announces=False,
     ),
     "drive": Command(
-        ".drive",
+        ".serve",
         "DriveCommand",
         "send a maneuver's cues to such a controller",
         "--maneuver slalom --to 127.0.0.1:47100",
         "`motion-cueing evaluate --replays FILE.npz` scores what `serve --log FILE.npz` wrote",
         announces=False,
+        run="run_drive",
     ),
     "demonstrate": Command(
         ".demonstrate",
@@ -259,7 +269,7 @@ def _dispatch(arguments: list[str]) -> int:
         print(_whole().generate_completion(prog_name=PROGRAM, shell=shell))  # type: ignore[arg-type]
         return SUCCESS
     if name == "__complete":
-        # The script of --print-completion asks for names.
+        # The script of --print-completion calls this to complete names.
         _whole()(arguments, result_action="return_none")
         return SUCCESS
     if name.startswith("-"):
@@ -271,7 +281,7 @@ def _dispatch(arguments: list[str]) -> int:
     from ..envs.progress import compilation_announced
 
     with compilation_announced() if command.announces else nullcontext():
-        return int(import_module(command.module, __package__).run(parsed))
+        return int(getattr(import_module(command.module, __package__), command.run)(parsed))
 
 
 def overview() -> str:
@@ -301,15 +311,8 @@ def overview() -> str:
 def parse(name: str, arguments: Sequence[str]) -> Any:
     """The arguments of a command.
 
-    Args:
-        name: Of the command.
-        arguments: Words after it.
-
     Returns:
-        Its dataclass; None where its help was asked for and has been shown.
-
-    Raises:
-        ConfigurationError: an argument is wrong.
+        Its dataclass; None where its help was requested and has been shown.
     """
     from cyclopts import CycloptsError
 

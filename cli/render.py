@@ -45,11 +45,7 @@ class RenderCommand:
 
 
 def run(command: RenderCommand) -> int:
-    """Drive, draw and write.
-
-    Raises:
-        MotionCueingError: an argument is wrong, or a package that draws is missing.
-    """
+    """Drive, draw and write."""
     from ..envs.rendering import FRAMES_PER_SECOND, Renderer
     from ..evaluation.reporting.film import check_suffix, film_frames, gif_rate, save_film
 
@@ -58,7 +54,7 @@ def run(command: RenderCommand) -> int:
         raise ConfigurationError("a png shows one moment, --begin; leave --end and --rate out")
     check_file("--out", command.out)
     size = command.size or (_GIF_SIZE if suffix == ".gif" else _FILM_SIZE)
-    # Made before anything is driven, so that a wrong size or a missing package is told at once.
+    # Made before anything is driven, so that a wrong size or a missing package is reported at once.
     renderer = Renderer(arguments.find_platform(command.platform), size)
     trajectory = drive(command)
     if suffix == ".png":

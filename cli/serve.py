@@ -1,7 +1,8 @@
-"""``motion-cueing serve``: a policy as a controller in real time, over UDP."""
+"""``motion-cueing serve`` and ``drive``: a controller in real time over UDP, and its test client."""
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 import threading
@@ -15,10 +16,11 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import compilation_announced
 from ..envs.storage import check_file
 from . import arguments
-from .arguments import PlatformName, PolicyName, Whole, option
+from .arguments import CarName, ManeuverName, Name, PlatformName, PolicyName, Whole, option
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
+    from ..realtime.client import Client
     from ..realtime.controller import Controller
     from ..realtime.machine import LiveMachine
     from ..realtime.report import LoopReport
@@ -77,6 +79,44 @@ class ServeCommand:
     """Counts and timings to write."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class DriveCommand:
+    """Drive a controller that `motion-cueing serve` runs: send cues in real time, check what comes back.
+
+    The exit status is 1 if nothing came back, or a set-point outside of the machine's limits. docs/loop.md
+    describes the packets.
+    """
+
+    maneuver: ManeuverName = "double-lane-change"
+    to: Annotated[str, option("HOST[:PORT]")] = f"127.0.0.1:{DEFAULT_PORT}"
+    """Where the controller listens."""
+    rate: Whole = 1000
+    """Packets a second; also the rate of the set-points that are expected."""
+    times: Whole = 1
+    """How often the maneuver is driven, one behind the other."""
+    platform: Name = "paper"
+    """Motion base of the controller, by name or YAML file, for its limits."""
+    car: CarName = "sedan"
+    format: Literal["floats", "msgpack"] = "floats"
+    """How packets are written; as the controller's."""
+    drop: float = 0.0
+    """Share of the packets that are not sent."""
+    repeat: float = 0.0
+    """Share that is sent twice."""
+    late: float = 0.0
+    """Share that is sent up to 50 ms late, out of order."""
+    nan: float = 0.0
+    """Share with a NaN in it."""
+    seed: Whole = 0
+    """Of what happens to packets."""
+    after: float = 1.0
+    """Time to go on listening after the last packet, s."""
+    cpu: Whole | None = None
+    """Core to run on alone."""
+    report: Annotated[Path | None, option("FILE.json")] = None
+    """Counts and timings to write."""
+
+
 @dataclass(frozen=True)
 class _Served:
     """Everything a command names, made before anything listens."""
@@ -88,11 +128,7 @@ class _Served:
 
 
 def run(command: ServeCommand) -> int:
-    """Serve until it is stopped.
-
-    Raises:
-        MotionCueingError: an argument is wrong.
-    """
+    """Serve until it is stopped."""
     _check(command)
     print(
         f"making {command.policy} for {command.platform}; it takes some seconds", file=sys.stderr, flush=True
@@ -149,8 +185,8 @@ def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
     host, port = endpoint.address
     print(f"{command.policy} on {command.platform}: UDP {host}:{port}, {command.rate} set-points a second")
     if not is_loopback(endpoint.address):
-        told = f"only {command.peer} moves it" if command.peer else "whoever sends first moves it; see --peer"
-        print(f"the network reaches {host}:{port}, beyond this machine: {told}")
+        who = f"only {command.peer} moves it" if command.peer else "whoever sends first moves it; see --peer"
+        print(f"the network reaches {host}:{port}, beyond this machine: {who}")
     sys.stdout.flush()
 
 
@@ -208,3 +244,54 @@ def _report(command: ServeCommand, controller: Controller, server: Server, endpo
         states={state: int((states == state).sum()) for state in State},
         faults=controller.faults,
     )
+
+
+def run_drive(command: DriveCommand) -> int:
+    """Drive; the exit status is 1 if nothing came back, or something outside of the limits."""
+    from ..envs.interrupt import Interrupt
+    from ..realtime.client import Client, NetworkFaults, cues_at
+    from ..realtime.packets import make_format
+    from ..realtime.server import Endpoint, address_of, is_loopback
+    from ..realtime.timing import undisturbed
+
+    _check_drive(command)
+    trace = arguments.find_maneuver(command.maneuver, arguments.find_car(command.car))[1]()
+    to = address_of(command.to, DEFAULT_PORT)
+    network = NetworkFaults(command.drop, command.repeat, command.late, command.nan, command.seed)
+    # From the loopback address nothing leaves this machine; other targets are reached from any.
+    endpoint = Endpoint(("127.0.0.1" if is_loopback(to) else "0.0.0.0", 0))
+    try:
+        platform, form = arguments.find_platform(command.platform), make_format(command.format)
+        client = Client(endpoint, to, form, platform, command.rate, network)
+        interrupt = Interrupt()
+        with interrupt.caught(), undisturbed(command.cpu):
+            client.run(cues_at(trace, command.rate, command.times), lambda: interrupt.asked)
+            client.listen(command.after)
+    finally:
+        endpoint.close()
+    return _finish_drive(command, client, endpoint)
+
+
+def _check_drive(command: DriveCommand) -> None:
+    if command.rate < 1 or command.times < 1 or not 0.0 <= command.after < math.inf:
+        raise ConfigurationError("--rate and --times must be at least 1, --after at least 0 and finite")
+    if command.report is not None:
+        check_file("--report", command.report)
+
+
+def _finish_drive(command: DriveCommand, client: Client, endpoint: Endpoint) -> int:
+    from ..evaluation.reporting.text import words_of
+    from ..realtime.report import report_of, show
+
+    if not client.counts["received"]:
+        raise OSError(None, "nothing came back; is `motion-cueing serve` running there?", command.to)
+    report = report_of(
+        words_of("drive", command),
+        client,
+        periods=client.periods,
+        packets={**client.counts, "unsent": endpoint.unsent},
+        states=client.states,
+        faults=client.faults,
+    )
+    show(report, "set-points", command.report)
+    return 1 if client.counts["outside_limits"] else 0

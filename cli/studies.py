@@ -1,35 +1,180 @@
-"""What the studies' commands have in common: checks, results, files."""
+"""``motion-cueing compare`` and ``robustness``: controllers on several machines, or under disturbances."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
-from ..evaluation.metrics import Criteria
-from ..evaluation.reporting.figures import png
-from ..evaluation.reporting.text import save_markdown, table_console
-from ..evaluation.studies.results import (
-    StudyResults,
-    common_maneuvers,
-    matrix_table,
-    print_study,
-    score_tables,
-    summarize,
+from .arguments import (
+    ALL,
+    BENCHMARK,
+    CarName,
+    Fresh,
+    ManeuverNames,
+    Name,
+    Names,
+    OutFolder,
+    PlatformName,
+    PolicyNames,
+    find_car,
+    find_maneuvers,
+    find_platform,
+    find_platforms,
+    find_policies,
 )
-from ..evaluation.studies.store import check_kept, forget_kept
-from ..evaluation.studies.study import Condition, StudyOutcome, run_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..envs.car import Car
+    from ..evaluation.studies.disturbances import Study
+    from ..evaluation.studies.results import StudyResults
+    from ..evaluation.studies.study import Condition, StudyOutcome
+    from ..evaluation.suite import CueSource
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareCommand:
+    """Drive maneuvers on several machines with several policies: how much machine does a controller need?
+
+    Drives that are done are kept in the output folder and not driven again.
+    """
+
+    platforms: Names = (ALL,)
+    """Motion bases, by name or YAML file; `all` for every whole one."""
+    policies: PolicyNames = (BENCHMARK,)
+    maneuvers: ManeuverNames = (ALL,)
+    ablations: bool = False
+    """Also each machine without its turntable, without its carriage, and with its hexapod alone."""
+    car: CarName = "sedan"
+    out: OutFolder = Path("comparison")
+    fresh: Fresh = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustnessCommand:
+    """Drive policies with slower actuators, dead time, noisy sensors, another car, and in faster drives.
+
+    Each policy is made for the machine as it should be and knows nothing of the disturbance. Policies of the
+    benchmark that know the drive beforehand are skipped. Without --maneuvers the standard maneuvers are
+    driven. Drives that are done are kept in the output folder and not driven again.
+    """
+
+    policies: PolicyNames = (BENCHMARK,)
+    maneuvers: ManeuverNames = ()
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
+    other_car: Name = "e-class-suv"
+    """The other car, by name or YAML file."""
+    lag: float = 30.0
+    """Natural frequency of the actuators' lag, rad/s."""
+    dead_time: float = 0.05
+    """Dead time of the actuators, s."""
+    force_noise: float = 0.05
+    """Standard deviation of the noise on specific forces, m/s^2."""
+    rate_noise: float = 0.3
+    """Standard deviation of the noise on angular velocities, deg/s."""
+    time_scaling: float = 2.0
+    """Factor on all accelerations of the drives."""
+    out: OutFolder = Path("robustness")
+    fresh: Fresh = False
+
+
+def run_compare(command: CompareCommand) -> int:
+    """Compare; the exit status is 1 if a drive failed."""
+    from ..evaluation.policies import make_policy
+    from ..evaluation.reporting.text import words_of
+    from ..evaluation.studies.figures import lines_figure
+    from ..evaluation.studies.study import Condition
+
+    machines = find_platforms(command.platforms, command.ablations)
+    car = find_car(command.car)
+    maneuvers = find_maneuvers(command.maneuvers, car)
+    policies = find_policies(command.policies, next(iter(machines.values())))
+    prepare(command.out, command.fresh)
+    conditions = [
+        Condition(
+            name,
+            machine.description,
+            machine,
+            car,
+            maneuvers,
+            partial(make_policy, platform=machine, force=True),
+        )
+        for name, machine in machines.items()
+    ]
+    return run_and_save(
+        conditions,
+        policies,
+        command.out,
+        words_of("compare", command),
+        "How much machine does a controller need?",
+        False,
+        lines_figure,
+    )
+
+
+def run_robustness(command: RobustnessCommand) -> int:
+    """Drive everything; the exit status is 1 if a drive failed."""
+    from ..evaluation.reporting.text import words_of
+    from ..evaluation.studies.figures import heat_figure
+
+    study = make_study(command)
+    policies = find_policies(command.policies, study.platform)
+    prepare(command.out, command.fresh)
+    return run_and_save(
+        study.conditions(),
+        policies,
+        command.out,
+        words_of("robustness", command),
+        "What happens to a controller?",
+        True,
+        heat_figure,
+    )
+
+
+def make_study(command: RobustnessCommand) -> Study:
+    """Everything but the policies, all names resolved."""
+    from ..envs.maneuvers import maneuver_names
+    from ..evaluation.benchmark import benchmark_policies
+    from ..evaluation.policies import policy_names
+    from ..evaluation.studies.disturbances import Disturbances, SensorNoise, Study
+
+    names = command.maneuvers or tuple(maneuver_names())
+
+    def maneuvers(driven: Car) -> Mapping[str, CueSource]:
+        return find_maneuvers(names, driven)
+
+    rows = benchmark_policies(policy_names()) if BENCHMARK in command.policies else []
+    return Study(
+        platform=find_platform(command.platform),
+        car=find_car(command.car),
+        other=find_car(command.other_car),
+        maneuvers=maneuvers,
+        causal=frozenset(rows) - set(command.policies),
+        disturbances=Disturbances(
+            lag=command.lag,
+            dead_time=command.dead_time,
+            noise=SensorNoise(force=command.force_noise, rate=math.radians(command.rate_noise)),
+            time_scaling=command.time_scaling,
+        ),
+    )
 
 
 def prepare(out: Path, fresh: bool) -> None:
-    """Refuse a folder that cannot be used; with ``fresh``, forget the drives that are kept.
+    """Refuse a folder that cannot be used; with ``fresh``, remove the finished drives.
 
     Raises:
         DataError: ``out`` cannot be written, holds another's study.json, or drives that are damaged.
     """
+    from ..evaluation.studies.study import check_kept, forget_kept
+
     check_folder("--out", out)
     check_own_json("--out", out / "study.json", frozenset({"schema", "conditions"}))
     if fresh:
@@ -60,11 +205,19 @@ def run_and_save(
     Returns:
         Exit status: 1 if a drive failed.
     """
+    from ..evaluation.reporting.figures import png
+    from ..evaluation.reporting.text import save_markdown, table_console
+    from ..evaluation.studies.results import matrix_table, print_study, score_tables
+    from ..evaluation.studies.study import run_study
+
     count = sum(len(condition.maneuvers) for condition in conditions) * len(policies)
     with drives_progress(count) as advance:
         outcome = run_study(conditions, policies, out, advance)
     results = results_of(conditions, list(policies), outcome, words)
-    _write(results, out, title, ratios)
+    results.save_json(out / "study.json")
+    results.save_csv(out / "study.csv")
+    skipped = [f"Skipped: {line}" for line in results.skipped_lines()]
+    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *skipped)
     drawn = figure(results)
     if drawn is not None:
         write_bytes(out / "study.png", png(drawn))
@@ -78,18 +231,13 @@ def run_and_save(
     return 1 if results.failures else 0
 
 
-def _write(results: StudyResults, out: Path, title: str, ratios: bool) -> None:
-    """What stays of a study, but its figure."""
-    results.save_json(out / "study.json")
-    results.save_csv(out / "study.csv")
-    skipped = [f"Skipped: {line}" for line in results.skipped_lines()]
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *skipped)
-
-
 def results_of(
     conditions: Sequence[Condition], policies: Sequence[str], outcome: StudyOutcome, words: Sequence[str]
 ) -> StudyResults:
     """The results of an outcome, with what made them."""
+    from ..evaluation.metrics import Criteria
+    from ..evaluation.studies.results import StudyResults, common_maneuvers, summarize
+
     criteria = Criteria()
     return StudyResults(
         **StudyResults.head(words),

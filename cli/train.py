@@ -1,18 +1,58 @@
-"""``motion-cueing train``: train an agent, or one with each of several seeds."""
+"""``motion-cueing train``, ``search`` and ``population``: trainings of agents, one or many."""
 
 from __future__ import annotations
 
+import shutil
 import sys
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass, fields, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from ..envs.errors import ConfigurationError
-from .arguments import several
-from .training import TrainingOptions, check, check_same, goes_on, new_config, place
+from ..envs.errors import ConfigurationError, DataError
+from .arguments import Fresh, Whole, Workers, named, option, several
 
 if TYPE_CHECKING:
-    from ..train.experiments.seeds import Seeds
+    from ..train.config import TrainingConfig
+    from ..train.experiments.seeds import Place, Seeds
     from ..train.run import RunFolder
+
+_NEEDED: Final = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "optuna", "safetensors")
+_FIXED: Final = {"algorithm": "algo", "seed": "seed", "envs": "n_envs", "initial": "initial"}
+"""Options that a training keeps to its end, and their fields in its configuration."""
+_ELSE: Final = "leave it out, name another --out, or add --fresh to begin anew"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingOptions:
+    """Options of every command that trains."""
+
+    algorithm: Annotated[
+        str | None, option("NAME", alias="--algo", completer=named("Training algorithms"))
+    ] = None
+    """Algorithm, of those that `motion-cueing list` names; the other options change its default
+    configuration."""
+    config: Annotated[Path | None, option("FILE.yaml|NAME")] = None
+    """Configuration: only what differs from the algorithm's default; or the name of a shipped agent's."""
+    initial: Annotated[Path | None, option("FILE.safetensors")] = None
+    """Agent whose network the training begins with, with the same observation and action."""
+    steps: Whole | None = None
+    """Actions in all, over all environments, such as 1e6; default: as the configuration says, like the next
+    two."""
+    seed: Whole | None = None
+    """Of everything that is drawn."""
+    envs: Whole | None = None
+    """Environments stepped together."""
+    out: Annotated[Path | None, option("DIR")] = None
+    """Folder for everything that comes of it; the command goes on from what is in it. Default: a new folder,
+    runs/ALGORITHM-1 and so on."""
+    fresh: Fresh = False
+    workers: Workers | None = None
+    """Trainings at a time, each in a process of its own; default: 1, with Ray one a core."""
+    engine: Literal["local", "ray"] = "local"
+    """Where trainings run: this machine alone, or Ray."""
+    address: Annotated[str | None, option("HOST:PORT")] = None
+    """Ray cluster to run on, which this machine is a part of; default: a Ray of its own on this machine."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,12 +67,33 @@ class TrainCommand(TrainingOptions):
     """Train with each of these seeds, which follow each other, such as 0 1 2 3."""
 
 
-def run(command: TrainCommand) -> int:
-    """Train.
+@dataclass(frozen=True, kw_only=True)
+class SearchCommand(TrainingOptions):
+    """Search for an algorithm's best hyperparameters.
 
-    Raises:
-        MotionCueingError: an argument, a file or a hyperparameter is wrong, or a package is missing.
+    The field `search` of the configuration says what is varied, --steps how long each training is. Hopeless
+    trainings are broken off early. The same command goes on from what is in --out; another --trials makes it
+    longer.
     """
+
+    trials: Whole
+    """Trainings in all."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PopulationCommand(TrainingOptions):
+    """Train a population: the worst go on from the best, with other values of what is varied.
+
+    The field `search` of the configuration says what is varied, the field `population` how. The same command
+    goes on from what is in --out.
+    """
+
+    members: Whole | None = None
+    """Trainings in the population; default: as the configuration says."""
+
+
+def run(command: TrainCommand) -> int:
+    """Train."""
     from ..train.experiments import seeds as studies
 
     check(command)
@@ -47,8 +108,7 @@ def run(command: TrainCommand) -> int:
 
 
 def _train(command: TrainCommand) -> int:
-    from ..train.experiments.seeds import report_training
-    from ..train.progress import TrainingProgress
+    from ..train.experiments.seeds import TrainingProgress, report_training
     from ..train.training import Training
 
     folder = _folder(command)
@@ -72,8 +132,6 @@ def _folder(command: TrainCommand) -> RunFolder:
 
 
 def _seeds(command: TrainCommand) -> Seeds:
-    from dataclasses import replace
-
     from ..train.experiments.seeds import Seeds
 
     seeds = command.seeds
@@ -94,3 +152,147 @@ def _seeds(command: TrainCommand) -> Seeds:
             f"--seeds: {command.out} was begun with {begun.count} seeds; leave it out, or name another --out"
         )
     return Seeds.open(command.out, command.steps)
+
+
+def run_search(command: SearchCommand) -> int:
+    """Search."""
+    from ..train.experiments.search import Search
+    from ..train.experiments.seeds import run_search as search_with
+
+    check(command)
+    where = place(command)
+    if command.out is None or not goes_on(command, "search"):
+        return search_with(Search.create(command.out, new_config(command)), command.trials, where)
+    search = Search.open(command.out)
+    if command.steps not in (None, search.config.steps):
+        raise ConfigurationError(
+            f"--steps {command.steps}: {command.out} was begun with {search.config.steps}; leave it out, or "
+            "name another --out"
+        )
+    check_same(replace(command, steps=None), search.config)
+    return search_with(search, command.trials, where)
+
+
+def run_population(command: PopulationCommand) -> int:
+    """Train."""
+    from ..train.experiments.population import Population
+    from ..train.experiments.seeds import run_population as train_with
+
+    check(command)
+    where = place(command)
+    if command.out is None or not goes_on(command, "population"):
+        members = None if command.members is None else {"members": command.members}
+        return train_with(Population.create(command.out, new_config(command, population=members)), where)
+    population = Population.open(command.out)
+    begun = population.config
+    for name, given, was in (
+        ("steps", command.steps, begun.steps),
+        ("members", command.members, begun.population.members),
+    ):
+        if given not in (None, was):
+            raise ConfigurationError(
+                f"--{name} {given}: {command.out} was begun with {was}; leave it out, or name another --out"
+            )
+    check_same(command, begun)
+    return train_with(population, where)
+
+
+def check(command: TrainingOptions) -> None:
+    """Refuse options that do not go together."""
+    missing = [name for name in _NEEDED if find_spec(name) is None]
+    if missing:
+        raise ConfigurationError(
+            f"training needs {', '.join(missing)}: pip install 'motion-cueing-gym[train]'"
+        )
+    for name in ("workers", "trials", "members"):
+        value = getattr(command, name, None)
+        if value is not None and value < 1:
+            raise ConfigurationError(f"--{name} must be at least 1, found {value}")
+    if command.address is not None and command.engine != "ray":
+        raise ConfigurationError("--address is of use only with --engine ray; leave it out")
+
+
+def place(command: TrainingOptions) -> Place:
+    """Where trainings run, checked before anything is written."""
+    from ..train.experiments.seeds import Place
+
+    place = Place(command.engine, command.workers, command.address)
+    place.check()
+    return place
+
+
+def new_config(command: TrainingOptions, **others: Any) -> TrainingConfig:
+    """The configuration of a new training.
+
+    Args:
+        command: The options.
+        **others: Further fields of it.
+    """
+    from ..train.config import load_config
+
+    return load_config(
+        command.algorithm,
+        command.config,
+        steps=command.steps,
+        seed=command.seed,
+        n_envs=command.envs,
+        initial=None if command.initial is None else str(command.initial),
+        **others,
+    )
+
+
+def goes_on(command: TrainingOptions, kind: str) -> bool:
+    """Whether --out holds work of this kind to go on from; with --fresh, that is removed first.
+
+    Args:
+        command: The options.
+        kind: "training", "seeds", "search" or "population".
+    """
+    out = command.out
+    if out is None or not out.is_dir() or not any(out.iterdir()):
+        return False
+    from ..train.experiments.seeds import kind_of
+
+    begun = kind_of(out)
+    if begun is None:
+        raise DataError(
+            f"--out {out}: there is something already that no training wrote; name another folder"
+        )
+    if begun != kind:
+        raise DataError(
+            f"--out {out} holds a {begun}; {_COMMAND[begun]} goes on with it; or name another folder"
+        )
+    if command.fresh:
+        shutil.rmtree(out)
+    return not command.fresh
+
+
+_COMMAND: Final = {
+    "training": "`motion-cueing train` without --seeds",
+    "seeds": "`motion-cueing train`",
+    "search": "`motion-cueing search`",
+    "population": "`motion-cueing population`",
+}
+
+
+def check_same(command: TrainingOptions, begun: TrainingConfig) -> None:
+    """Refuse options that differ from those that the training in --out was begun with; --steps may."""
+    from ..envs.settings import to_dict
+    from ..train.config import load_config
+
+    for flag, name in _FIXED.items():
+        given, was = getattr(command, flag), getattr(begun, name)
+        if given is not None and str(given) != str(was):
+            raise ConfigurationError(f"--{flag} {given}: {command.out} was begun with {was}; {_ELSE}")
+    if command.config is None:
+        return
+    fixed = {name: getattr(begun, name) for name in ("steps", "seed", "n_envs", "initial")}
+    fixed["population"] = to_dict(begun.population)
+    given = load_config(command.algorithm, command.config, **fixed)
+    other = [
+        field.name for field in fields(begun) if getattr(given, field.name) != getattr(begun, field.name)
+    ]
+    if other:
+        raise ConfigurationError(
+            f"--config {command.config}: {command.out} was begun with another {', '.join(other)}; {_ELSE}"
+        )

@@ -81,11 +81,7 @@ class TuneCommand:
 
 
 def run(command: TuneCommand) -> int:
-    """Search, and write what was found.
-
-    Raises:
-        MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
-    """
+    """Search, and write the best parameters."""
     from ..baselines.washout.families import FAMILIES
     from ..envs.interrupt import Interrupt
 
@@ -97,8 +93,8 @@ def run(command: TuneCommand) -> int:
     search = _search(record, command, goes_on)
     interrupt = Interrupt()
     with interrupt.caught(), Bars() as bars:
-        tell = Telling(bars, search.options.budget)
-        stopped = search.run(tell, lambda: interrupt.asked)
+        show = SearchProgress(bars, search.options.budget)
+        stopped = search.run(show, lambda: interrupt.asked)
     _write(command, search, goes_on)
     status = search.status
     if stopped:
@@ -110,7 +106,7 @@ def run(command: TuneCommand) -> int:
     return _SUCCESS
 
 
-class Telling:
+class SearchProgress:
     """Shows a search: a bar of the hours simulated, and lines where there is no terminal.
 
     Args:
@@ -170,11 +166,7 @@ def _new(command: TuneCommand) -> Record:
 
 
 def _begun(command: TuneCommand) -> Record:
-    """The record of an earlier session, with as many hours as are asked for.
-
-    Raises:
-        ConfigurationError: an option is given that differs from the search's.
-    """
+    """The record of an earlier session, with the requested hours."""
     from ..baselines.tuning.search import load_record
     from ..baselines.washout.families import algorithm_of, load_of
 
@@ -249,7 +241,7 @@ def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
 
 
 def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
-    """The policy, with what is known about it on top."""
+    """The policy, with its origin and scores on top."""
     import yaml
 
     from ..envs.provenance import commit, hardware, now, versions
@@ -261,8 +253,8 @@ def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
     name, drives = _out(command).stem, len(search.objective.drives)
     many = f"{drives} random drives" if options.maneuvers == ("train",) else ", ".join(options.maneuvers)
     spent = f"{search.status.hours:.3g} h"
-    told = f"{options.start.name} tuned with {spent} by {how} for {goal} on {many}"
-    tuned = search.result(name, told)
+    about = f"{options.start.name} tuned with {spent} by {how} for {goal} on {many}"
+    tuned = search.result(name, about)
     notes = [
         f"{_MADE_BY}{search.command}" + (", stopped and resumed" if goes_on else ""),
         f"{now()}, commit {commit() or 'unknown'}, {hardware('cpu')}",
@@ -292,10 +284,10 @@ def _held_out(search: Search) -> Objective:
 
 
 def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
-    found = objective.evaluate([start, tuned])
+    scores = objective.evaluate([start, tuned])
     return [
-        f"{where}: {name} J {found.cue_error[i]:.3f}, perceived {found.perceived_error[i]:.3f}, "
-        f"{100.0 * found.at_limit[i]:.3f} % of the time at a limit, "
-        f"{100.0 * found.violation[i]:.3f} % where none may be met"
+        f"{where}: {name} J {scores.cue_error[i]:.3f}, perceived {scores.perceived_error[i]:.3f}, "
+        f"{100.0 * scores.at_limit[i]:.3f} % of the time at a limit, "
+        f"{100.0 * scores.violation[i]:.3f} % where none may be met"
         for i, name in enumerate((start.name, tuned.name))
     ]

@@ -193,7 +193,7 @@ def write_tables() -> None:
     """Fill ``build/generated``."""
     from motion_cueing.envs.task.observation import observation_table
     from motion_cueing.envs.task.reward import reward_table
-    from motion_cueing.evaluation.reporting.definitions import definitions
+    from motion_cueing.evaluation.reporting.report import definitions
 
     texts = {
         **definitions(),

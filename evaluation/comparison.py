@@ -248,7 +248,11 @@ def judge_suite(
     drives = {name: [policies[name] for policies in common.values()] for name in next(iter(common.values()))}
     errors = {name: mean([m.cue_error for m in each]) for name, each in drives.items()}
     perceived = {name: mean([m.perceived_cue_error for m in each]) for name, each in drives.items()}
-    verdict = _judge("all", {name: _mean_terms(each) for name, each in drives.items()}, perceived)
+    means = {}
+    for name, each in drives.items():
+        parts = [terms(metrics) for metrics in each]
+        means[name] = {key: mean([one[key] for one in parts]) for key in product(CUE_AXES, CAUSES)}
+    verdict = _judge("all", means, perceived)
     winners = [judge(maneuver, policies).best for maneuver, policies in common.items()]
     scores = normalized_scores(errors, perceived, references or References())
     return verdict, [
@@ -284,8 +288,3 @@ def _judge(maneuver: str, policies: Mapping[str, Terms], perceived: Mapping[str,
         perceived_best=min(perceived, key=lambda name: (perceived[name], name)),
         advantages=tuple(advantage(policies[best], name, policies[name]) for name in rivals),
     )
-
-
-def _mean_terms(drives: list[Metrics]) -> Terms:
-    every = [terms(metrics) for metrics in drives]
-    return {key: mean([parts[key] for parts in every]) for key in product(CUE_AXES, CAUSES)}

@@ -52,11 +52,7 @@ class Demonstrator:
 
     @classmethod
     def of(cls, name: str, platform: Platform) -> Demonstrator:
-        """A controller by name or file.
-
-        Raises:
-            MotionCueingError: there is none of this name.
-        """
+        """A controller by name or file."""
         return cls(name, make_policy(name, platform), platform, get_vestibular_model("zacharias"))
 
     @property

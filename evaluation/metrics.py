@@ -336,12 +336,7 @@ class ActuatorSignals:
 
 
 class DriveSignals:
-    """The signals of a drive.
-
-    Args:
-        trajectory: The drive.
-        criteria: The thresholds.
-    """
+    """The signals of a drive."""
 
     def __init__(self, trajectory: Trajectory, criteria: Criteria) -> None:
         self.trajectory, self.criteria = trajectory, criteria

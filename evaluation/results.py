@@ -1,21 +1,27 @@
-"""Results of an evaluation: ``results.json`` and ``results.csv``; see docs/results-format.md."""
+"""Files of results: written whole or not at all, and read from this and from earlier versions.
+
+:class:`Results` is ``results.json`` of an evaluation; docs/reference/file-formats.md describes the fields.
+Studies, endurance, frequency responses and the paper's cases have files of their own kind.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 
 from pydantic import JsonValue
 from typing_extensions import Self
 
-from ..envs.provenance import now, plain, versions
-from ..envs.settings import configuration, renamed, to_dict
+from ..envs.errors import DataError
+from ..envs.provenance import now, package_version, plain, versions
+from ..envs.settings import configuration, from_dict, renamed, to_dict
 from ..envs.storage import write_text
 from .comparison import NormalizedScore, SuiteScore, Verdict, judge, judge_suite, normalized_scores
 from .metrics import Criteria, Metrics
-from .saved import Saved
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,21 +30,110 @@ SCHEMA: Final = 2
 """Version of ``results.json``; version 1 is read, too."""
 
 
-def save_rows(
-    rows: Sequence[Mapping[str, Any]], path: str | Path, header: Sequence[str] | None = None
-) -> None:
-    """Write rows as CSV, whole or not at all; None becomes an empty cell.
+class Saved:
+    """A configuration with a file of its own. Its field ``schema`` is the version of the file.
+
+    Attributes:
+        what: Its name in messages.
+        version: Version that is written.
+        oldest: Oldest version that is read.
+    """
+
+    what: ClassVar[str]
+    version: ClassVar[int]
+    oldest: ClassVar[int | None] = None
+
+    def save_json(self, path: str | Path) -> None:
+        """Write the file, whole or not at all."""
+        write_text(path, json.dumps(to_dict(self), indent=1, allow_nan=False) + "\n")
+
+    @classmethod
+    def load_json(cls, path: str | Path) -> Self:
+        """Read a file of this version, or of an earlier one that can be brought up to it.
+
+        Raises:
+            DataError: the file is missing, broken, or of another version.
+            ConfigurationError: a field is missing, unknown or wrong.
+        """
+        try:
+            values = json.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise DataError(f"{path}: cannot be read as {cls.what} ({error})") from None
+        schema = values.get("schema") if isinstance(values, dict) else None
+        oldest = cls.version if cls.oldest is None else cls.oldest
+        if not isinstance(schema, int) or not oldest <= schema <= cls.version:
+            known = f"{cls.version}" if oldest == cls.version else f"{oldest} to {cls.version}"
+            raise DataError(f"{path}: {cls.what} of version {schema}, this package reads {known}")
+        return from_dict(cls, cls.upgrade(values) | {"schema": cls.version}, str(path))
+
+    @classmethod
+    def upgrade(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """The content of a file, with the structure of the current version."""
+        return values
+
+
+@configuration
+class Headed(Saved):
+    """Results that begin with their origin.
 
     Args:
-        rows: Cells by column.
-        path: The file.
-        header: Columns; those of the first row if not given.
+        schema: Version of the file.
+        command: The command line.
+        created: UTC, ISO 8601.
+        versions: Of this package, Python and the libraries that matter.
     """
+
+    schema: int
+    command: str
+    created: str
+    versions: dict[str, str]
+
+    @classmethod
+    def head(cls, words: Sequence[str]) -> dict[str, Any]:
+        """The fields above, for results that a command line (program first) makes now."""
+        return {
+            "schema": cls.version,
+            "command": shlex.join(words),
+            "created": now(),
+            "versions": versions(),
+        }
+
+
+T = TypeVar("T")
+
+
+def load_drives_done(kind: type[T], path: Path, of: str) -> T:
+    """Read a file of finished drives.
+
+    Args:
+        kind: The configuration in it.
+        path: The file, which exists.
+        of: What the drives belong to, for messages.
+    """
+    try:
+        return from_dict(kind, json.loads(path.read_text(encoding="utf-8")), str(path))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError:
+        # Which of its many numbers is wrong helps nobody.
+        raise DataError(f"{path}: damaged, not the drives of {of}; delete it, or add --fresh") from None
+
+
+def drive_key(**parts: Any) -> str:
+    """A hash of everything that a drive depends on, as plain values.
+
+    The version of the package is in it, changes to its code within a version are not.
+    """
+    whole = {"version": package_version(), **parts}
+    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def save_rows(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
+    """Write rows (cells by column) as CSV, whole or not at all; None becomes an empty cell."""
     import pandas as pd
 
     # Objects keep their own text: a count beside an empty cell stays a whole number.
-    columns = list(header or (rows[0] if rows else ()))
-    save_frame(pd.DataFrame([*map(dict, rows)], columns=columns, dtype=object), path)
+    save_frame(pd.DataFrame([*map(dict, rows)], columns=list(rows[0]) if rows else [], dtype=object), path)
 
 
 def save_frame(frame: pd.DataFrame, path: str | Path) -> None:
@@ -83,14 +178,7 @@ class Provenance:
 
     @classmethod
     def of(cls, words: Sequence[str], platform: Any, car: Any, policies: Mapping[str, Any]) -> Self:
-        """The origin of results that are made now.
-
-        Args:
-            words: The command line, program first.
-            platform: Configuration of the motion base; it has a name.
-            car: Configuration of the car; it has a name.
-            policies: Metadata of each policy.
-        """
+        """The origin of results that a command line makes now, with the metadata of each policy."""
         return cls(
             command=shlex.join(words),
             created=now(),

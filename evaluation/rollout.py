@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Final
@@ -109,12 +109,15 @@ class Rollout:
     def __init__(
         self, policy: Any, machines: Machines, start: ArrayLike | None = None, finite: bool = False
     ) -> None:
-        policy, own = as_policy(policy), as_policy(policy).time_step
-        if own is not None and own != machines.time_step:
+        acting = as_policy(policy)
+        if acting.time_step not in (None, machines.time_step):
             raise ConfigurationError(
-                f"the policy's time step is {own} s, the rollout's {machines.time_step} s"
+                f"the policy's time step is {acting.time_step} s, the rollout's {machines.time_step} s"
             )
-        self.policy = _for_drives(policy, machines.drives)
+        if acting.needs_drive:
+            each = [acting.for_drive(drive) for drive in machines.drives]
+            acting = each[0] if len(each) == 1 else OneEach(each)
+        self.policy = acting
         self.interface = self.policy.connect(machines)
         self.simulator = self.interface.simulator
         self._actor = Actor(self.policy, self.simulator.n, self.interface.action_size, finite)
@@ -129,7 +132,7 @@ class Rollout:
 
     @property
     def requested(self) -> Floats:
-        """(n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2."""
+        """(n, 9) accelerations requested of the axes in the last time step, m/s^2 and rad/s^2."""
         return self.interface.requested
 
     def steps(self) -> Iterator[float]:
@@ -148,22 +151,14 @@ class Rollout:
                 seconds = np.nan
 
 
-def _for_drives(policy: Policy, drives: Sequence[CueTrace]) -> Policy:
-    """The policy that acts in all drives: itself, or one for each drive."""
-    if not policy.needs_drive:
-        return policy
-    each = [policy.for_drive(drive) for drive in drives]
-    return each[0] if len(each) == 1 else OneEach(each)
-
-
 @dataclass(frozen=True)
 class Recording:
     """One drive; row k is the machine at sample k, row 0 the start.
 
     Args:
         states: (n,) rows of ``Simulator.state``.
-        actions: (n, 9) accelerations asked for in the step that ended at a row.
-        seconds: (n,) wall-clock time of the policy; NaN where it was not asked.
+        actions: (n, 9) accelerations requested in the step that ended at a row.
+        seconds: (n,) wall-clock time of the policy; NaN where it held its last action.
     """
 
     states: NDArray[Any]
@@ -190,13 +185,7 @@ def record(run: Rollout, on_step: Callable[[int, int], None] | None = None) -> R
 
 
 def trajectory_of(recording: Recording, run: Rollout, car: Car | None = None) -> Trajectory:
-    """The trajectory of a recorded drive.
-
-    Args:
-        recording: The drive.
-        run: That drove it.
-        car: That was driven, for the record.
-    """
+    """The trajectory of a recorded drive."""
     states, platform, policy = recording.states, run.simulator.platforms[0], run.policy
     cues = run.simulator.drives[0]
     motion, simulated, reference = states["motion"], states["simulator_cue"], states["reference_cue"]

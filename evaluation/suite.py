@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
-from rich.markup import escape
 
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, MotionCueingError
 from .metrics import Criteria, Metrics, measure
-from .reporting.text import how_many
+from .reporting.text import how_many, print_note
 from .results import Failure
 from .rollout import statistics_of
 from .trajectory import Trajectory
@@ -79,47 +78,28 @@ def run_suite(
         except Exception as error:
             outcome.failures.append(Failure(maneuver, None, explain(error)))
             continue
-        drives = _drive_all(maneuver, cues, policies, progress, outcome)
-        measured = _measure_all(maneuver, drives, criteria, outcome)
-        outcome.maneuvers[maneuver] = measured
-        drives = {name: drives[name] for name in measured}
-        for name, drive in drives.items():
-            outcome.metadata.setdefault(name, dict(drive.metadata))
-            if statistics_of(drive.metadata):
-                outcome.notes.setdefault(maneuver, {})[name] = statistics_of(drive.metadata)
+        drives: dict[str, Trajectory] = {}
+        measured = outcome.maneuvers[maneuver] = {}
+        for name, drive in policies.items():
+            progress(maneuver, name)
+            # A policy is a user's code: whatever it raises must not cost the other drives. Metrics are finite
+            # numbers; a drive beyond all bounds has none.
+            try:
+                driven = replace(drive(cues), maneuver=maneuver, policy=name)
+                measured[name] = measure(driven, criteria)
+            except Exception as error:
+                outcome.failures.append(Failure(maneuver, name, explain(error)))
+                continue
+            drives[name] = driven
+            outcome.metadata.setdefault(name, dict(driven.metadata))
+            if statistics_of(driven.metadata):
+                outcome.notes.setdefault(maneuver, {})[name] = statistics_of(driven.metadata)
         if drives:
             try:
                 finish(maneuver, drives)
             except Exception as error:
                 outcome.failures.append(Failure(maneuver, None, explain(error)))
     return outcome
-
-
-def _measure_all(
-    maneuver: str, drives: Mapping[str, Trajectory], criteria: Criteria | None, outcome: Outcome
-) -> dict[str, Metrics]:
-    measured: dict[str, Metrics] = {}
-    for name, drive in drives.items():
-        # Metrics are finite numbers; a drive beyond all bounds has none, and must not cost the others.
-        try:
-            measured[name] = measure(drive, criteria)
-        except Exception as error:
-            outcome.failures.append(Failure(maneuver, name, explain(error)))
-    return measured
-
-
-def _drive_all(
-    maneuver: str, cues: CueTrace, policies: Mapping[str, Drive], progress: OnDrive, outcome: Outcome
-) -> dict[str, Trajectory]:
-    drives: dict[str, Trajectory] = {}
-    for name, drive in policies.items():
-        progress(maneuver, name)
-        # A policy is a user's code: whatever it raises must not cost the other drives.
-        try:
-            drives[name] = replace(drive(cues), maneuver=maneuver, policy=name)
-        except Exception as error:
-            outcome.failures.append(Failure(maneuver, name, explain(error)))
-    return drives
 
 
 def explain(error: Exception) -> str:
@@ -206,7 +186,7 @@ def _number(counted: Mapping[str, str], name: str) -> int:
 def print_troubles(console: Console, notes: Iterable[tuple[str, str, Mapping[str, str]]]) -> None:
     """Show :func:`trouble_lines`."""
     for policy, line in trouble_lines(notes).items():
-        console.print(f"[bold]counted[/bold] {escape(policy)}: {escape(line)}", highlight=False)
+        print_note(console, "counted", f"{policy}: {line}")
 
 
 DRIVEN: Final = "driven"
@@ -241,7 +221,7 @@ def cue_sources(drives: Mapping[str, Trajectory]) -> dict[str, CueSource]:
 
 
 def cues_of(drive: Trajectory, name: str) -> CueTrace:
-    """The cues that were wanted in a drive."""
+    """The reference cues of a drive."""
     return CueTrace(
         name, drive.time, drive.f_reference, drive.w_reference, source=f"as driven by {drive.policy}"
     )

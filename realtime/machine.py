@@ -32,7 +32,7 @@ AT_REST.setflags(write=False)
 _SCALE: Final = np.repeat([SCALES["reference_force"], SCALES["reference_rate"]], 3)
 
 NOW: Final = 1
-"""Row of the cues that are wanted now; the kernels step to it from the row before."""
+"""Row of the present reference cue; the kernels step to it from the row before."""
 
 
 def standing(ahead: int) -> CueTrace:
@@ -102,7 +102,7 @@ AXES_AND_LEGS: Final = 15
 
 
 class MotionView:
-    """Reads where a machine's set-point is, fast: its memory is found once, not field by field each time.
+    """Reads where a machine's set-point is, fast: its memory is looked up once, not field by field each time.
 
     Args:
         simulator: With one environment on the CPU.
@@ -244,7 +244,7 @@ class LiveMachine:
             raise
 
     def act(self) -> tuple[Floats, float]:
-        """Let the policy act; returns the (9,) accelerations it asks for, and the seconds it took.
+        """Let the policy act; returns the (9,) accelerations it requests, and the seconds it took.
 
         Raises:
             Exception: any error of the policy's own code, or an ActionError; nothing has moved then.
@@ -286,7 +286,7 @@ class LiveMachine:
     def _arrive(self) -> None:
         motion = self._view()
         if not np.isfinite(motion).all():
-            raise ActionError("the policy asked for accelerations beyond all numbers")
+            raise ActionError("the policy requested accelerations beyond all numbers")
         self.motion = motion
 
 

@@ -10,7 +10,7 @@ from typing import Final
 from ..envs.provenance import hardware
 from ..envs.settings import configuration
 from ..evaluation.reporting.text import NOTHING, TextTable, print_table, table_console
-from ..evaluation.saved import Headed
+from ..evaluation.results import Headed
 from .client import Client
 from .server import Server
 from .timing import QUANTILES, TimingSummary
@@ -29,7 +29,7 @@ class LoopReport(Headed):
         duration: From the first period to the last, s.
         periods: Number of periods.
         overrun: Periods that were not over when the next should have begun.
-        skipped: Periods left out, since an earlier one took too long.
+        skipped: Skipped periods, since an earlier one took too long.
         packets: Packets received, by kind.
         states: Counts by state: time steps of a controller, set-points received by a client.
         timings: By name, see :mod:`~.server` and :class:`~.client.Client`.
@@ -58,16 +58,7 @@ def report_of(
     states: Mapping[State, int],
     faults: Sequence[str],
 ) -> LoopReport:
-    """The report of a run.
-
-    Args:
-        words: The command line.
-        run: Server or client after it.
-        periods: Number of periods.
-        packets: By kind.
-        states: By state of the controller.
-        faults: In words.
-    """
+    """The report of a run."""
     return LoopReport(
         **LoopReport.head(words),
         hardware=hardware("cpu"),
@@ -83,19 +74,14 @@ def report_of(
 
 
 def summary_lines(report: LoopReport, unit: str) -> list[str]:
-    """The counts in words; zeros are left out.
-
-    Args:
-        report: The report.
-        unit: Of its ``states``.
-    """
+    """The counts in words; zeros are not shown."""
     missed = report.overrun + report.skipped
     percent = 100.0 * missed / max(report.periods + report.skipped, 1)
     packets = ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in report.packets.items() if n)
     states = ", ".join(f"{name} {n}" for name, n in report.states.items() if n)
     lines = [
         f"{report.periods} periods in {report.duration:.1f} s; deadlines missed: {missed} ({percent:.4f} %), "
-        f"{report.overrun} late and {report.skipped} left out",
+        f"{report.overrun} late and {report.skipped} skipped",
         f"packets: {packets or 'none'}",
     ]
     return [*lines, *([f"{unit}: {states}"] if states else []), *report.faults]

@@ -27,7 +27,7 @@ class Pace:
 
     Attributes:
         overrun: Periods that were not over when the next should have begun.
-        skipped: Periods left out.
+        skipped: Skipped periods.
     """
 
     def __init__(self, rate: int, clock: Callable[[], int] = time.perf_counter_ns) -> None:
@@ -54,7 +54,7 @@ class Pace:
 
 @contextmanager
 def undisturbed(cpu: int | None = None, priority: int | None = None) -> Iterator[None]:
-    """Without garbage collection; on one core and with real-time priority, where asked for.
+    """Without garbage collection; on one core and with real-time priority, where requested.
 
     Core and priority are given back at the end: logs are written as by any other program.
 

@@ -207,7 +207,8 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
         DataError: the file cannot be read or is not YAML.
         ConfigurationError: a field is unknown, missing or out of range.
     """
-    given = {} if path is None else _fields(_recipe(path))
+    recipe = _RECIPES / f"{path}.yaml" if str(path) in recipe_names() else path
+    given = {} if recipe is None else _fields(recipe)
     named = given.get("algo")
     if algo is not None and named not in (None, algo):
         raise ConfigurationError(f"{path}: it is for algo {named}, but --algorithm is {algo}; leave one out")
@@ -231,11 +232,6 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
 def recipe_names() -> list[str]:
     """Names of the configurations that made the shipped agents."""
     return sorted(path.stem for path in _RECIPES.glob("*.yaml"))
-
-
-def _recipe(path: Path) -> Path:
-    """The file of a recipe, or the path itself."""
-    return _RECIPES / f"{path}.yaml" if str(path) in recipe_names() else path
 
 
 def _fields(path: Path) -> dict[str, Any]:

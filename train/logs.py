@@ -81,9 +81,6 @@ class TrainingLog:
     Args:
         folder: Of the training.
         steps: Actions so far; later rows, of a training that was broken off, are dropped.
-
-    Raises:
-        DataError: the file of an earlier session is broken.
     """
 
     def __init__(self, folder: Path, steps: int = 0) -> None:
@@ -118,7 +115,7 @@ class TrainingLog:
 
 
 def read_log(folder: Path) -> list[dict[str, float]]:
-    """The rows of a training's log; scalars that a row does not have are left out.
+    """The rows of a training's log; a row has only its own scalars.
 
     Raises:
         DataError: the file is broken.
@@ -129,9 +126,9 @@ def read_log(folder: Path) -> list[dict[str, float]]:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-            found = [{name: float(text) for name, text in row.items() if text} for row in rows]
+            scalars = [{name: float(text) for name, text in row.items() if text} for row in rows]
     except (OSError, ValueError, TypeError) as error:
         raise DataError(f"{path}: not the log of a training ({error})") from None
-    if any(STEPS not in row for row in found):
+    if any(STEPS not in row for row in scalars):
         raise DataError(f"{path}: not the log of a training (column {STEPS} is missing)")
-    return found
+    return scalars

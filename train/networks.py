@@ -79,11 +79,7 @@ def load_weights(layers: Iterable[nn.Linear], network: Network) -> None:
 
 
 class TorchNetwork(nn.Module):
-    """A network with its normalization in PyTorch, in the order of operations of :class:`~.agents.Network`.
-
-    Args:
-        network: In NumPy.
-    """
+    """A network with its normalization in PyTorch, in the order of :class:`~.agents.Network`."""
 
     def __init__(self, network: Network) -> None:
         super().__init__()

@@ -11,7 +11,7 @@ import io
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -106,34 +106,8 @@ _RECORD: Final = "run.json"
 _DEFAULT_PARENT: Final = Path("runs")
 
 
-@dataclass(frozen=True)
-class Session:
-    """One start of a training, the first or one that resumes.
-
-    Args:
-        command: The command line.
-        begun: When, ISO 8601.
-        steps: Actions there were already.
-        versions: Of this package and the libraries.
-        hardware: What it runs on.
-        commit: Of the sources, if they are in git.
-    """
-
-    command: str
-    begun: str
-    steps: int
-    versions: dict[str, str] = field(default_factory=provenance.versions)
-    hardware: str = ""
-    commit: str | None = field(default_factory=provenance.commit)
-
-
 class RunFolder:
-    """A training's folder.
-
-    Args:
-        path: Where it is.
-        config: What is trained.
-    """
+    """A training's folder."""
 
     def __init__(self, path: Path, config: TrainingConfig) -> None:
         self.path, self.config = path, config
@@ -141,11 +115,7 @@ class RunFolder:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> RunFolder:
-        """The folder of a new training, made when it begins; by default the next of ``runs/ALGO-1``, -2...
-
-        Raises:
-            ConfigurationError: the folder is not empty.
-        """
+        """The folder of a new training, made when it begins; by default the next of ``runs/ALGO-1``, -2..."""
         return cls(free_folder(path, config.algo), config)
 
     @classmethod
@@ -166,11 +136,7 @@ class RunFolder:
 
     @classmethod
     def take_up(cls, path: Path, config: TrainingConfig) -> RunFolder:
-        """The folder of a training that may have been begun: of a process that died, nobody knows.
-
-        Raises:
-            DataError: a file of it is broken.
-        """
+        """The folder of a training that may have been begun: of a process that died, nobody knows."""
         run = cls.open(path) if (path / _RECORD).exists() else cls(path, config)
         run.config = config
         return run
@@ -194,9 +160,15 @@ class RunFolder:
         """Note a start: configuration, command, versions, hardware, commit."""
         self.checkpoints.mkdir(parents=True, exist_ok=True)
         save(self.config, self.path / _CONFIG)
-        hardware = provenance.hardware(self.config.device)
-        session = Session(provenance.command_line(), provenance.now(), steps, hardware=hardware)
-        self.sessions.append(asdict(session))
+        session = {
+            "command": provenance.command_line(),
+            "begun": provenance.now(),
+            "steps": steps,
+            "versions": provenance.versions(),
+            "hardware": provenance.hardware(self.config.device),
+            "commit": provenance.commit(),
+        }
+        self.sessions.append(session)
         record = {"algo": self.config.algo, "seed": self.config.seed, "sessions": self.sessions}
         write_text(self.path / _RECORD, json.dumps(record, indent=2) + "\n")
 
@@ -221,13 +193,9 @@ class RunFolder:
         return path
 
     def last_checkpoint(self) -> dict[str, Any] | None:
-        """The latest checkpoint's state; None where there is none yet.
-
-        Raises:
-            DataError: it is damaged.
-        """
-        found = checkpoints_in(self.checkpoints)
-        return read_checkpoint(found[-1]) if found else None
+        """The latest checkpoint's state; None where there is none yet."""
+        checkpoints = checkpoints_in(self.checkpoints)
+        return read_checkpoint(checkpoints[-1]) if checkpoints else None
 
 
 def is_training(path: Path) -> bool:

@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,7 +22,7 @@ from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.drives import platform_of
 from .agents import Agent, Network, Record
-from .agents.base_policy import DEFAULT, base_parameters
+from .agents.agent import DEFAULT, base_parameters
 from .config import Measure, TrainingConfig
 from .logs import TrainingLog
 from .networks import Actor, start_as_spring_damper
@@ -32,11 +32,7 @@ from .validation import Score, Validation
 
 
 def initial_agent(config: TrainingConfig) -> Agent | None:
-    """The agent of ``config.initial``, or None where nothing is named.
-
-    Raises:
-        DataError: the file cannot be read.
-    """
+    """The agent of ``config.initial``, or None where nothing is named."""
     return None if config.initial is None else Agent.load(config.initial)
 
 
@@ -58,17 +54,29 @@ def initial_network(config: TrainingConfig) -> Network | None:
 
 
 def start_actor(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
-    """Initialize an actor: the network of ``config.initial``, or a spring to neutral where none is named.
-
-    Raises:
-        DataError: the agent's file cannot be read, or its network has other layers.
-        ConfigurationError: that agent has another observation, action or platform.
-    """
+    """Initialize an actor: the network of ``config.initial``, or a spring to neutral where none is named."""
     network = initial_network(config)
     if network is None:
         start_as_spring_damper(actor, batch)
     else:
         actor.load(network)
+
+
+def check_episodes(config: TrainingConfig, why: str) -> None:
+    """Refuse settings of algorithms that learn from whole episodes, on the CPU, in the machine's own scales.
+
+    Args:
+        config: The training.
+        why: The reason why observations and rewards are not normalized.
+    """
+    if config.task.episode.duration is None:
+        raise ConfigurationError(
+            "task.episode.duration must say how long an episode is, s; 20 is a good start"
+        )
+    if config.normalize.observation or config.normalize.reward:
+        raise ConfigurationError(f"normalize must be off for {config.algo}: {why}")
+    if not str(config.device).startswith("cpu"):
+        raise ConfigurationError(f"device {config.device}: {config.algo} runs on the CPU")
 
 
 _WARM_UP: Final = 0.1
@@ -92,7 +100,7 @@ def warm_cosine(progress: float) -> float:
 
 
 Tell = Callable[["Status"], None]
-"""Shown the status at every boundary."""
+"""Receives the status at every boundary."""
 
 
 @dataclass
@@ -118,7 +126,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a training.
+    """The result of a training.
 
     Args:
         status: At the end.
@@ -129,29 +137,13 @@ class Outcome:
     interrupted: bool
 
 
-@dataclass
-class _Clock:
-    """Wall time of all sessions, s."""
-
-    before: float = 0.0
-    begun: float = field(default_factory=time.perf_counter)
-
-    @property
-    def total(self) -> float:
-        return self.before + time.perf_counter() - self.begun
-
-
 class Training:
     """One training in its folder.
 
     Args:
         run: The folder; a checkpoint in it is gone on from.
-        tell: Shown the status at every boundary.
+        tell: Receives the status at every boundary.
         interrupt: Whoever decides when to stop; default: Ctrl-C, which is caught while it trains.
-
-    Raises:
-        ConfigurationError: the configuration does not fit its algorithm.
-        DataError: the checkpoint is damaged.
     """
 
     def __init__(
@@ -165,7 +157,8 @@ class Training:
         self._initial = None if begun is None else begun.record
         self.learner: Learner = ALGORITHMS[config.algo](config)
         self.validation = Validation(run.config)
-        self._clock, self._seen = _Clock(), -1
+        # As if all sessions had followed each other without a pause.
+        self._begun, self._seen = time.perf_counter(), -1
         self._interrupt = interrupt or Interrupt()
         self._caught = self._interrupt.caught if interrupt is None else nullcontext
         self.status = Status(0, run.config.steps)
@@ -174,10 +167,10 @@ class Training:
 
     def _go_on(self, state: dict[str, Any]) -> None:
         self.learner.restore(state["learner"])
-        self._clock = _Clock(state["elapsed"])
+        self._begun -= state["elapsed"]
         self._seen = self.status.steps = self.learner.steps
         self.status.best, self.status.reference = state["best"], state["reference"]
-        # Checkpoints before this was kept have none.
+        # Checkpoints of early versions have none.
         if state.get("score") is not None:
             self.status.score = Score(**state["score"])
         if state["initial"] is not None:
@@ -195,7 +188,7 @@ class Training:
                     self._measure_reference()
                 self.learner.learn(self._boundary)
                 self._boundary()
-                self._finish()
+                self.agent("final").save(self.run.final_agent)
         except StopTraining:
             return Outcome(self.status, interrupted=True)
         finally:
@@ -249,7 +242,7 @@ class Training:
             seed=config.seed,
             command=self.run.sessions[0]["command"],
             steps=self.learner.steps,
-            wall_time=round(self._clock.total, 1),
+            wall_time=round(time.perf_counter() - self._begun, 1),
             hardware=session["hardware"],
             versions=session["versions"],
             created=session["begun"],
@@ -264,16 +257,13 @@ class Training:
         """Write a checkpoint of the boundary this is called at."""
         state = {
             "learner": self.learner.state(),
-            "elapsed": self._clock.total,
+            "elapsed": time.perf_counter() - self._begun,
             "best": self.status.best,
             "reference": self.status.reference,
             "score": None if self.status.score is None else asdict(self.status.score),
             "initial": None if self._initial is None else to_dict(self._initial),
         }
         return self.run.save_checkpoint(self.status.steps, state)
-
-    def _finish(self) -> None:
-        self.agent("final").save(self.run.final_agent)
 
 
 def rating(score: Score, measure: Measure) -> float:

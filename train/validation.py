@@ -15,7 +15,7 @@ from ..envs.task import ActionOptions, TaskOptions
 from ..envs.task.batch import Batch
 from ..envs.task.environment import normalized
 from ..envs.task.kernels.reward import N_TERMS, TERMS
-from .agents.base_policy import base_policy
+from .agents.agent import base_policy
 from .config import TrainingConfig, validation_task
 
 Act = Callable[[NDArray[np.float32]], ArrayLike]
@@ -57,11 +57,7 @@ class Score:
 
 
 class Validation:
-    """The validation drives of a training, all in one batch.
-
-    Args:
-        config: The training.
-    """
+    """The validation drives of a training, all in one batch."""
 
     def __init__(self, config: TrainingConfig) -> None:
         self.task = validation_task(config)

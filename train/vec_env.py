@@ -203,7 +203,7 @@ class DrivingSimulatorVecEnv(VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """Only as ``Monitor`` would: episodes are told in ``info``."""
+        """True for ``Monitor`` alone: ``info`` reports episodes as it does."""
         return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
 
     def _refuse_some(self, indices: VecEnvIndices) -> None:

@@ -16,19 +16,16 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from ...envs.car import car_names
-from ...envs.errors import DataError
 from ...envs.maneuvers import RandomDrives
 from ...envs.maneuvers.roads import KINDS
 from ...envs.platform import Platform
-from ...envs.provenance import package_version
-from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
+from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.storage import write_text
 from ...envs.task import RandomizationOptions, TaskOptions
 from ...envs.task.drives import machines_of
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
-from ..results import save_rows
-from ..saved import Headed
+from ..results import Headed, load_drives_done, save_rows
 
 NOMINAL: Final = "nominal"
 """Name of the condition with the machine as it should be."""
@@ -64,7 +61,7 @@ class Endurance:
     machines: Annotated[int, Field(ge=1)] = 64
 
     def __post_init__(self) -> None:
-        # The ranges are those of an environment, which says what is wrong with them.
+        # The ranges are those of an environment, which checks them.
         assert self.randomization(SLOWER).platforms == self.machines
 
     def randomization(self, condition: str) -> RandomizationOptions:
@@ -97,7 +94,7 @@ class Endured:
         perceived_cue_error: J of the perceived cues.
         at_limit: Share of time with any actuator held back by any limit.
         beyond: Samples at which the true motion is beyond any limit.
-        exceeded: Samples by kind of limit, see :data:`~.checks.KINDS`.
+        exceeded: Samples by kind of limit, see :data:`~.run.KINDS`.
         actions_not_finite: Actions with an entry that is no finite number.
     """
 
@@ -165,7 +162,7 @@ class PolicyEndurance:
     """The finished drives of a policy.
 
     Args:
-        key: Hash of everything that drives depend on; see :func:`endurance_key`.
+        key: Hash of everything that drives depend on but their seeds; see :func:`~..results.drive_key`.
         drives: Finished drives.
         extremes: By condition; of all kept drives, also where fewer are requested.
     """
@@ -255,19 +252,17 @@ class EnduranceResults(Headed):
                     name: getattr(drive, name) for name in ("name", "seed", "car", "friction", "machine")
                 }
                 for condition, endured in drive.conditions.items():
-                    yield {"policy": policy, **about, "condition": condition, **_flat(endured)}
+                    values = to_dict(endured)
+                    values |= {f"exceeded_{kind}": n for kind, n in values.pop("exceeded").items()}
+                    yield {"policy": policy, **about, "condition": condition, **values}
 
 
 def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSummary:
-    """Drives in one; at least one.
-
-    Args:
-        drives: The drives.
-        time_step: s.
-    """
+    """Drives in one; at least one."""
     nominal, slower = ([drive.conditions[name] for drive in drives] for name in (NOMINAL, SLOWER))
     both = [*nominal, *slower]
-    worst = max(drives, key=lambda drive: _or_inf(drive.conditions[SLOWER].cue_error))
+    errors = [float("inf") if one.cue_error is None else one.cue_error for one in slower]
+    worst = drives[errors.index(max(errors))]
     return EnduranceSummary(
         drives=len(drives),
         hours=sum(one.samples - 1 for one in nominal) * time_step / 3600.0,
@@ -295,19 +290,9 @@ def by_kind(drives: Sequence[EnduredDrive]) -> dict[str, list[EnduredDrive]]:
     return kinds
 
 
-def _flat(endured: Endured) -> dict[str, Any]:
-    exceeded = {f"exceeded_{kind}": count for kind, count in endured.exceeded.items()}
-    plain = ("samples", "cue_error", "perceived_cue_error", "at_limit", "beyond", "actions_not_finite")
-    return {**{name: getattr(endured, name) for name in plain}, **exceeded}
-
-
 def _mean(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if len(known) == len(values) else None
-
-
-def _or_inf(value: float | None) -> float:
-    return float("inf") if value is None else value
 
 
 def _ratio(over: float | None, under: float | None) -> float | None:
@@ -324,11 +309,8 @@ class EnduranceStore:
     Args:
         folder: Of the results.
         policy: Label of the policy.
-        key: Of :func:`endurance_key`; drives of another key are not taken.
-        fresh: Remove what is kept.
-
-    Raises:
-        DataError: a file is damaged.
+        key: See :class:`PolicyEndurance`; drives of another key are not taken.
+        fresh: Remove the finished drives.
     """
 
     def __init__(self, folder: Path, policy: str, key: str, fresh: bool = False) -> None:
@@ -336,22 +318,9 @@ class EnduranceStore:
         self._path = folder / FOLDER / f"{plain_name(policy)}-{tag}.json"
         if fresh:
             self._path.unlink(missing_ok=True)
-        self.kept = self._load(key)
-
-    def _load(self, key: str) -> PolicyEndurance:
-        try:
-            kept = from_dict(
-                PolicyEndurance, json.loads(self._path.read_text(encoding="utf-8")), str(self._path)
-            )
-        except FileNotFoundError:
-            return PolicyEndurance(key)
-        except OSError as error:
-            raise DataError(f"{self._path}: cannot be read ({error.strerror})") from None
-        except ValueError:
-            raise DataError(
-                f"{self._path}: damaged, not the drives of an endurance; delete it, or add --fresh"
-            ) from None
-        return kept if kept.key == key else PolicyEndurance(key)
+        empty = PolicyEndurance(key)
+        kept = load_drives_done(PolicyEndurance, self._path, "an endurance") if self._path.exists() else empty
+        self.kept = kept if kept.key == key else empty
 
     def missing(self, seeds: Sequence[int]) -> list[int]:
         """Those of the seeds whose drives are not done."""
@@ -359,12 +328,7 @@ class EnduranceStore:
         return [seed for seed in seeds if seed not in done]
 
     def keep(self, drives: Collection[EnduredDrive], extremes: Mapping[str, dict[str, float]]) -> None:
-        """Write finished drives at once, whole or not at all.
-
-        Args:
-            drives: The drives.
-            extremes: Of them, by condition.
-        """
+        """Write finished drives at once, whole or not at all."""
         before = self.kept
         merged = {
             condition: before.extremes.get(condition, Extremes()).merged(values)
@@ -372,23 +336,6 @@ class EnduranceStore:
         }
         self.kept = PolicyEndurance(before.key, (*before.drives, *drives), merged)
         write_text(self._path, json.dumps(to_dict(self.kept), allow_nan=False) + "\n")
-
-
-def endurance_key(platform: Platform, endurance: Endurance, policy: Mapping[str, Any]) -> str:
-    """A hash of everything that a policy's drives depend on, but their seeds.
-
-    Args:
-        platform: The machine.
-        endurance: Options of the drives.
-        policy: From :func:`~..studies.store.identity`.
-    """
-    whole = {
-        "version": package_version(),
-        "platform": to_dict(platform),
-        "endurance": to_dict(endurance),
-        "policy": dict(policy),
-    }
-    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()
 
 
 _SHARES: Final = ("position", "rate", "acceleration")

@@ -1,7 +1,8 @@
 """Endurance: policies through hours of random drives, a batch at a time, on nominal and slower machines.
 
 Everything about a drive follows from its seed: road, car, friction, machine. Finished drives are kept policy
-by policy, so that a run that was stopped goes on, and can be made longer.
+by policy, so that a run that was stopped goes on, and can be made longer. :class:`TrueLimits` checks the true
+motion by NumPy's kinematics, without the limiter.
 """
 
 from __future__ import annotations
@@ -13,19 +14,26 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...baselines.interface import Machines
 from ...baselines.policy import Policy
+from ...envs.arrays import FLOAT
 from ...envs.car.simulation import Plan, simulate
 from ...envs.cues import CueTrace
 from ...envs.errors import DataError
-from ...envs.platform import Platform
-from ...envs.simulator.simulator import TIME_STEP
+from ...envs.platform import Platform, actuator_limits
+from ...envs.platform.kernels.step import LEGS
+from ...envs.platform.kinematics import leg_motion
+from ...envs.platform.limits import limits_exceeded
+from ...envs.settings import to_dict
+from ...envs.simulator.simulator import TIME_STEP, Simulator
 from ...envs.task.drives import slippery
+from ..metrics import Criteria, cue_error
 from ..policies import make_policy
+from ..results import drive_key
 from ..rollout import Rollout
-from ..studies.store import identity
-from .checks import drive_and_check
+from ..studies.study import identity
 from .results import (
     NOMINAL,
     SLOWER,
@@ -34,8 +42,177 @@ from .results import (
     Endured,
     EnduredDrive,
     PolicyEndurance,
-    endurance_key,
 )
+
+Floats = NDArray[np.float64]
+
+KINDS: Final = ("position", "rate", "acceleration", "pose", "number")
+"""What can be exceeded: an actuator's travel, speed or acceleration; a pose, which its legs must hold and
+which must not be singular; and numbers, where the motion is not finite."""
+
+TOLERANCE: Final = 1e-6 if FLOAT is np.float64 else 1e-2
+"""Of each limit, relative, for rounding; legs may differ from their pose by as much, m."""
+
+_LIMITED: Final = ("position", "rate", "acceleration")
+
+
+class TrueLimits:
+    """Holds motion against a machine's own numbers, batch by batch in the order of time.
+
+    Actuators of the hexapod are not taken from the machine's step, but computed from the pose it came to.
+
+    Args:
+        platform: The machine; lag and dead time make no difference.
+        n: Environments.
+        dt: Time step, s.
+    """
+
+    def __init__(self, platform: Platform, n: int, dt: float) -> None:
+        self._hexapod, self._dt = platform.hexapod, dt
+        self._limits = actuator_limits(platform)
+        self._before: Floats = np.zeros((0, n, 9))
+        self.use = dict.fromkeys(_LIMITED, 0.0)
+        self.clearance = 1.0
+
+    def exceeded(self, motion: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
+        """(steps, n) whether each of :data:`KINDS` is exceeded.
+
+        Keeps the largest ``use`` of a limit, which is 1, and the least ``clearance`` of singular poses, both
+        where they are finite.
+
+        Args:
+            motion: (steps, n) rows of ``envs.platform.kernels.step.Motion``; they follow those of the
+            last call.
+        """
+        position, rate, reported, clearance = self._actuators(motion)
+        change = np.diff(np.concatenate([self._before, rate]), axis=0) / self._dt
+        # A machine that begins has come from rest.
+        change = np.concatenate([np.zeros((len(rate) - len(change), *rate.shape[1:])), change])
+        self._before = rate[-1:].copy()
+        limits = self._limits
+        ends = np.where(position < 0.0, -limits["position_min"], limits["position_max"])
+        largest = (ends, limits["velocity"], limits["acceleration"])
+        for name, values, limit in zip(_LIMITED, (position, rate, change), largest, strict=True):
+            share = np.divide(np.abs(values), limit, out=np.zeros_like(values), where=limit > 0.0)
+            self.use[name] = float(np.max(share, initial=self.use[name], where=np.isfinite(share)))
+        self.clearance = float(np.min(clearance, initial=self.clearance, where=np.isfinite(clearance)))
+        exceeded = limits_exceeded(limits, position, rate, change, TOLERANCE)
+        holds = (np.abs(position[..., LEGS] - reported) <= TOLERANCE).all(axis=-1) & (clearance > 0.0)
+        finite = np.isfinite(position).all(axis=-1) & np.isfinite(rate).all(axis=-1)
+        beyond = [np.asarray(flags.any(axis=-1)) for flags in exceeded]
+        return dict(zip(KINDS, (*beyond, np.logical_not(holds), np.logical_not(finite)), strict=True))
+
+    def _actuators(self, motion: NDArray[Any]) -> tuple[Floats, Floats, Floats, Floats]:
+        """Positions and rates (steps, n, 9), legs of the step (steps, n, 6), clearance (steps, n)."""
+        shape, rows = motion.shape, motion.reshape(-1)
+        position, rate = (np.array(rows[name], dtype=np.float64) for name in ("position", "rate"))
+        reported = position[:, LEGS].copy()
+        pose = np.hstack([rows["displacement"], rows["beta"]]).astype(np.float64)
+        pose_rate = np.hstack([rows["velocity"], rows["beta_rate"]]).astype(np.float64)
+        # Legs of a pose that is not finite are not a number, and count as such.
+        with np.errstate(invalid="ignore"):
+            legs = leg_motion(self._hexapod, pose, pose_rate)
+        position[:, LEGS], rate[:, LEGS] = legs.extension, legs.rate
+        return (
+            position.reshape(*shape, 9),
+            rate.reshape(*shape, 9),
+            reported.reshape(*shape, 6),
+            legs.clearance.reshape(shape),
+        )
+
+
+_ROWS: Final = 8192
+"""Time steps of drives that are checked together: some ten megabytes."""
+
+_CHANNELS: Final = (
+    ("reference_cue", "simulator_cue", "cue_error"),
+    ("perceived_reference", "perceived_simulator", "perceived_cue_error"),
+)
+
+
+class Watch:
+    """Cue errors and limits of a simulator's drives, a block of time steps at a time."""
+
+    def __init__(self, simulator: Simulator, platform: Platform) -> None:
+        self._simulator, n = simulator, simulator.n
+        self._rows = np.zeros((max(1, _ROWS // n), n), dtype=simulator.state.dtype)
+        self._filled, self._criteria = 0, Criteria()
+        self.limits = TrueLimits(platform, n, simulator.dt)
+        self.samples = 0
+        self.at_limit = np.zeros(n, dtype=np.int64)
+        self.beyond = np.zeros(n, dtype=np.int64)
+        self.exceeded = {kind: np.zeros(n, dtype=np.int64) for kind in KINDS}
+        self.errors = {name: np.zeros(n) for _, _, name in _CHANNELS}
+
+    def note(self) -> bool:
+        """Take the state now; returns whether a block was full and was checked."""
+        # As bytes, which NumPy copies at once; structures it copies field by field.
+        self._rows[self._filled].view(np.uint8)[...] = self._simulator.state.view(np.uint8)
+        self._filled += 1
+        if self._filled < len(self._rows):
+            return False
+        self.check()
+        return True
+
+    def check(self) -> None:
+        """Check the states noted since the last time."""
+        rows, self._filled = self._rows[: self._filled], 0
+        if not len(rows):
+            return
+        self.samples += len(rows)
+        self.at_limit += np.count_nonzero(rows["limits"], axis=0)
+        exceeded = self.limits.exceeded(rows["motion"])
+        for kind, flags in exceeded.items():
+            self.exceeded[kind] += flags.sum(axis=0)
+        self.beyond += np.any(list(exceeded.values()), axis=0).sum(axis=0)
+        for reference, simulated, name in _CHANNELS:
+            error = cue_error(_cues(rows[reference]), _cues(rows[simulated]), self._criteria)
+            self.errors[name] += error.reshape(rows.shape).sum(axis=0)
+
+
+def _cues(side: NDArray[Any]) -> Floats:
+    """(rows, 6) specific force and angular velocity."""
+    flat = side.reshape(-1)
+    return np.hstack([flat["force"], flat["rate"]]).astype(np.float64)
+
+
+def drive_and_check(
+    run: Rollout, platform: Platform, progress: Callable[[int], None] = lambda steps: None
+) -> tuple[list[Endured], dict[str, float]]:
+    """Drive drives of one length to their end.
+
+    Args:
+        run: At the first sample, with actions made finite.
+        platform: The machine as it should be.
+        progress: Called now and then with the time steps done since; what it raises ends the drive.
+
+    Returns:
+        The result of each drive, and of all: the largest use of each limit and the least clearance of
+        singular poses.
+    """
+    watch = Watch(run.simulator, platform)
+    done = reported = 0
+    watch.note()
+    for done, _ in enumerate(run.steps(), start=1):
+        if watch.note():
+            progress(done - reported)
+            reported = done
+    watch.check()
+    progress(done - reported)
+    means = {name: total / watch.samples for name, total in watch.errors.items()}
+    drives = [
+        Endured(
+            samples=watch.samples,
+            **{name: float(mean[i]) if np.isfinite(mean[i]) else None for name, mean in means.items()},
+            at_limit=float(watch.at_limit[i] / watch.samples),
+            beyond=int(watch.beyond[i]),
+            exceeded={kind: int(counts[i]) for kind, counts in watch.exceeded.items()},
+            actions_not_finite=int(run.not_finite[i]),
+        )
+        for i in range(run.simulator.n)
+    ]
+    return drives, {**watch.limits.use, "clearance": watch.limits.clearance}
+
 
 _MACHINE_STREAM: Final = 2
 _FRICTION_STREAM: Final = 3
@@ -64,27 +241,20 @@ class SeededDrive:
 def seeded_drives(endurance: Endurance, seeds: Sequence[int]) -> list[SeededDrive]:
     """The drives of seeds; those whose car leaves the range of its model are skipped.
 
-    A car that slides off its path stays in: its driver feels that, too.
-
-    Raises:
-        ConfigurationError: a seed or the duration is out of range.
+    A car that slides off its path stays in: its driver perceives that, too.
     """
     plans = [endurance.drives.plan(seed, endurance.duration) for seed in seeds]
-    frictions = [_friction(endurance, seed) for seed in seeds]
+    random = np.random.default_rng
+    frictions = [float(random((seed, _FRICTION_STREAM)).uniform(*endurance.friction)) for seed in seeds]
+    machines = [int(random((seed, _MACHINE_STREAM)).integers(endurance.machines)) for seed in seeds]
     plans = [replace(p, car=slippery(p.car, factor)) for p, factor in zip(plans, frictions, strict=True)]
     return [
-        SeededDrive(seed, plan.car.name, friction, _machine(endurance, seed), cues)
-        for seed, friction, plan, cues in zip(seeds, frictions, plans, _driven(plans), strict=True)
+        SeededDrive(seed, plan.car.name, friction, machine, cues)
+        for seed, friction, machine, plan, cues in zip(
+            seeds, frictions, machines, plans, _driven(plans), strict=True
+        )
         if cues is not None
     ]
-
-
-def _friction(endurance: Endurance, seed: int) -> float:
-    return float(np.random.default_rng((seed, _FRICTION_STREAM)).uniform(*endurance.friction))
-
-
-def _machine(endurance: Endurance, seed: int) -> int:
-    return int(np.random.default_rng((seed, _MACHINE_STREAM)).integers(endurance.machines))
 
 
 def _driven(plans: Sequence[Plan]) -> list[CueTrace | None]:
@@ -103,7 +273,7 @@ def _alone(plan: Plan) -> CueTrace | None:
 
 
 Progress = Callable[[str, float], None]
-"""Given what is driven, and the seconds of drive done since the last call."""
+"""Called with the policy and condition at hand, and the seconds of drive done since the last call."""
 
 CONDITIONS: Final = (NOMINAL, SLOWER)
 
@@ -151,11 +321,7 @@ class EnduranceOutcome:
 
 
 class EnduranceRun:
-    """Drives what is not done yet.
-
-    Args:
-        request: The drives.
-        fresh: Forget what these policies have driven.
+    """Drives the missing drives.
 
     Raises:
         MotionCueingError: there is no such policy, or it was not made for the machine.
@@ -169,8 +335,11 @@ class EnduranceRun:
         }
         self._stores: dict[str, EnduranceStore] = {}
         for label, policy in self._policies.items():
-            about = identity(request.policies[label], policy)
-            key = endurance_key(request.platform, request.endurance, about)
+            key = drive_key(
+                platform=to_dict(request.platform),
+                endurance=to_dict(request.endurance),
+                policy=identity(request.policies[label], policy),
+            )
             self._stores[label] = EnduranceStore(request.folder, label, key, fresh)
 
     @property
@@ -180,7 +349,7 @@ class EnduranceRun:
         return drives * len(CONDITIONS) * self._request.endurance.duration
 
     def drive(self, progress: Progress) -> EnduranceOutcome:
-        """Drive until everything is done, or ``progress`` raises :class:`Stopped`; what is done is kept."""
+        """Drive to the end, or until ``progress`` raises :class:`Stopped`; finished drives are on disk."""
         try:
             for drives in self._batches():
                 for label in self._policies:

@@ -18,15 +18,14 @@ from ...envs.settings import configuration
 from ..metrics import CUE_AXES, Criteria
 from ..reporting.figures import CAR, line_styles, new_figure, png, styled
 from ..reporting.text import NOTHING, TextTable, number
-from ..results import save_rows
-from ..saved import Saved
+from ..results import Saved, save_rows
 from .response import FrequencyResponse
 
 SCHEMA: Final = 1
 """Version of ``frequency-response.json``."""
 
 CROSSED: Final = (("f_x", "w_y"), ("f_y", "w_x"), ("w_y", "f_x"), ("w_x", "f_y"))
-"""Input and felt axis of the crossed responses that the test asks for: tilt coordination, and its reverse."""
+"""Input axis and simulator axis of the crossed responses of the test: tilt coordination, and its reverse."""
 
 
 def response_table(response: FrequencyResponse) -> TextTable:
@@ -90,7 +89,7 @@ def _flat(response: FrequencyResponse) -> Iterator[Mapping[str, Any]]:
 
 
 def save_csv(responses: Sequence[FrequencyResponse], path: Path) -> None:
-    """Write one row a policy, input axis, felt axis and frequency, in SI units."""
+    """Write one row a policy, input axis, simulator axis and frequency, in SI units."""
     save_rows([row for response in responses for row in _flat(response)], path)
 
 
@@ -114,18 +113,13 @@ class SavedResponses(Saved):
     responses: tuple[FrequencyResponse, ...]
 
 
-def save_json(responses: Sequence[FrequencyResponse], arguments: Sequence[str], path: Path) -> None:
+def save_json(responses: Sequence[FrequencyResponse], words: Sequence[str], path: Path) -> None:
     """Write everything, with the command line and the versions that made it."""
-    SavedResponses(SCHEMA, shlex.join(arguments), versions(), tuple(responses)).save_json(path)
+    SavedResponses(SCHEMA, shlex.join(words), versions(), tuple(responses)).save_json(path)
 
 
 def load_json(path: str | Path) -> list[FrequencyResponse]:
-    """Read what :func:`save_json` wrote.
-
-    Raises:
-        DataError: the file is missing, broken, or of another version.
-        ConfigurationError: a field is missing, unknown or wrong.
-    """
+    """Read what :func:`save_json` wrote."""
     return list(SavedResponses.load_json(path).responses)
 
 
@@ -157,8 +151,10 @@ def bode_figure(responses: Sequence[FrequencyResponse]) -> bytes:
             _modulus(grid[row, column], responses, styles, axis, axis, 1.0)
             _phase(grid[row + 1, column], responses, styles, axis)
             if axis not in _inputs(responses):
-                _not_measured(grid[row, column])
-                _not_measured(grid[row + 1, column])
+                for axes in (grid[row, column], grid[row + 1, column]):
+                    place = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+                    axes.text(0.5, 0.5, "not measured", color="#8a8a8a", **place)
+                    axes.set_facecolor("#f5f5f5")
             grid[row, column].set_title(_TITLES[axis])
             grid[row, column].set_ylim(0.01, 4.0)
         for axes in grid[-1]:
@@ -189,21 +185,14 @@ def matrix_figure(responses: Sequence[FrequencyResponse], criteria: Criteria | N
                 grid[i, 0].set_ylabel(f"simulator {simulated}")
             grid[0, j].set_title(f"car's {moved}")
             grid[-1, j].set_xlabel("rad/s")
-        felt_at_all = {
-            r.policy for r in responses for j in r.inputs for i in CUE_AXES if np.any(r.response(j, i))
-        }
-        _finish(figure, responses, "Every axis to every input", felt_at_all, _ABOUT_MATRIX)
+        drawn = {r.policy for r in responses for j in r.inputs for i in CUE_AXES if np.any(r.response(j, i))}
+        _finish(figure, responses, "Every axis to every input", drawn, _ABOUT_MATRIX)
         return png(figure)
 
 
 def _inputs(responses: Sequence[FrequencyResponse]) -> list[str]:
     """Axes that were moved."""
     return [axis for axis in CUE_AXES if any(axis in response.inputs for response in responses)]
-
-
-def _not_measured(axes: Axes) -> None:
-    axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", va="center", color="#8a8a8a")
-    axes.set_facecolor("#f5f5f5")
 
 
 def _styles(responses: Sequence[FrequencyResponse]) -> Styles:
@@ -217,22 +206,12 @@ def _finish(
     simulated: Collection[str],
     more: str = "",
 ) -> None:
-    """Title and legend.
-
-    Args:
-        figure: With the panels.
-        responses: That are drawn.
-        title: Of the figure.
-        simulated: Policies that have a line somewhere; of the others the legend says why they have none.
-        more: Second line of the title.
-    """
+    """Title and legend, which says of policies without any line (not in ``simulated``) why they have none."""
     about = f"motion base {responses[0].platform}, {amplitudes(responses[0].test.scale)}"
     figure.suptitle(f"{title} ({about})\n{more}".strip(), fontsize=11, x=0.01, ha="left")
     styles = _styles(responses)
     nothing = {"linestyle": ""}
-    handles = [
-        Line2D([], [], **(style if policy in simulated else nothing)) for policy, style in styles.items()
-    ]
+    handles = [Line2D([], [], **(styles[policy] if policy in simulated else nothing)) for policy in styles]
     labels = [policy if policy in simulated else f"{policy}: nothing comes through" for policy in styles]
     columns = max(1, min(len(labels), int(figure.get_figwidth() / 2)))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
@@ -276,7 +255,7 @@ def _phase(axes: Axes, responses: Sequence[FrequencyResponse], styles: Styles, a
     axes.axhline(0.0, color=CAR, linewidth=0.8, linestyle=(0, (4, 2)))
     for response in responses:
         values = response.response(axis, axis)
-        # Where nothing is felt the phase is that of rounding.
+        # Where nothing comes through the phase is that of rounding.
         simulated = np.abs(values) > _LEAST
         phase = np.degrees(np.unwrap(np.angle(values[simulated])))
         line = {"marker": "o", "markersize": 2.5, **styles[response.policy]}

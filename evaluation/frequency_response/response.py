@@ -45,7 +45,7 @@ class FrequencyTest:
 
     Args:
         frequencies: Of the sinusoids, rad/s.
-        scale: Of all amplitudes: 1 for the test itself, 0.1 or less for what is linear near rest.
+        scale: Of all amplitudes: 1 for the test itself, 0.1 or less for the linear response near rest.
         force: Amplitude of specific force, m/s^2 (ICAO 9625, from memory).
         rate: Largest amplitude of angular velocity, rad/s (1 deg/s; ICAO 9625, from memory).
         attitude: Largest amplitude of attitude, rad, which holds at low frequencies (6 deg; the same).
@@ -82,7 +82,7 @@ class Probe:
     Args:
         cues: The drive: the sinusoid swells while the machine settles, then stays as it is.
         axis: Of :data:`CUE_AXES`, that moves.
-        frequency: Of the sinusoid, rad/s: the one asked for, moved so that whole periods are whole samples.
+        frequency: Of the sinusoid, rad/s: the requested one, moved so that whole periods are whole samples.
         samples: Length of the window at the end of the drive: whole periods.
     """
 
@@ -154,7 +154,7 @@ def _tilted(angles: Floats) -> Floats:
 def harmonic(signal: Floats, frequency: float, dt: float) -> tuple[NDArray[np.complex128], Floats]:
     """The sinusoid in signals over whole periods, and how much of them it explains.
 
-    A line is taken out first, as a least-squares fit together with the sinusoid: what is left of a slow start
+    A line is taken out first, as a least-squares fit together with the sinusoid: the rest of a slow start
     is nearly one.
 
     Args:
@@ -181,7 +181,7 @@ def harmonic(signal: Floats, frequency: float, dt: float) -> tuple[NDArray[np.co
 Complexes = NDArray[np.complex128]
 
 SILENCE: Final = 1e-6
-"""Modulus, in SI units, below which nothing comes through: what is left is rounding, which has no phase."""
+"""Modulus, in SI units, below which nothing comes through: the rest is rounding, which has no phase."""
 
 
 @configuration
@@ -192,11 +192,11 @@ class Sinusoid:
         input: The axis of :data:`~.metrics.CUE_AXES` that the car moves on.
         frequency: rad/s.
         amplitude: Of the input, m/s^2 or rad/s.
-        modulus: By axis: amplitude of what is felt over ``amplitude``.
-        phase: By axis: of what is felt before what is wanted on ``input``, rad, within (-pi, pi]; None where
-            the modulus is below :data:`SILENCE`.
-        explained: Share of the variance felt on the input's own axis that is this sinusoid; 1 if the policy
-            is linear, 0 where nothing is felt.
+        modulus: By axis: amplitude of the simulator cue over ``amplitude``.
+        phase: By axis: of the simulator cue before the reference cue on ``input``, rad, within (-pi, pi];
+            None where the modulus is below :data:`SILENCE`.
+        explained: Share of the simulator cue's variance on the input's own axis that is this sinusoid; 1 if
+            the policy is linear, 0 where nothing comes through.
         at_limit: Share of the measured time with any actuator at any limit.
     """
 
@@ -237,8 +237,8 @@ class FrequencyResponse:
     def response(self, moved: str, simulated: str) -> Complexes:
         """(n,) complex response of an axis to an input axis, by :meth:`frequencies`; 0 in silence."""
         chosen = [(s.modulus[simulated], s.phase[simulated]) for s in self.sinusoids if s.input == moved]
-        found = [0.0 if phase is None else modulus * np.exp(1j * phase) for modulus, phase in chosen]
-        return np.array(found, dtype=np.complex128)
+        values = [0.0 if phase is None else modulus * np.exp(1j * phase) for modulus, phase in chosen]
+        return np.array(values, dtype=np.complex128)
 
 
 def frequency_response(
@@ -255,7 +255,7 @@ def frequency_response(
         platform: The machine.
         test: Frequencies, amplitudes, durations.
         axes: To be moved, of :data:`~.metrics.CUE_AXES`.
-        progress: Told each frequency before it is driven.
+        progress: Called with each frequency before it is driven.
     """
     test, policy = test or FrequencyTest(), as_policy(policy).for_platform(platform)
     sinusoids: list[Sinusoid] = []
@@ -272,7 +272,7 @@ def frequency_response(
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """Wanted and felt motion (n, 6) of the window, and whether any actuator was at a limit (n,)."""
+    """Reference and simulator cue (n, 6) in the window, and whether any actuator was at a limit (n,)."""
 
     reference: Floats
     simulated: Floats

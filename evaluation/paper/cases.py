@@ -25,8 +25,8 @@ from ...envs.settings import configuration
 from ...envs.storage import write_bytes, write_text
 from ..reporting.figures import CAR, new_figure, png, styled
 from ..reporting.text import number
+from ..results import Saved
 from ..rollout import rollout
-from ..saved import Saved
 from ..trajectory import Floats, Trajectory
 from .statements import Check, Drives, all_checks, predicted_ripple
 

@@ -286,10 +286,10 @@ def _spread(heights: list[float], least: float) -> list[float]:
     order = sorted(range(len(heights)), key=heights.__getitem__)
     for i in order:
         moved[i] = max(heights[i], max(moved.values(), default=-1.0) + least)
-    ceiling = 1.0
+    highest = 1.0
     for i in reversed(order):
-        moved[i] = min(moved[i], ceiling)
-        ceiling = moved[i] - least
+        moved[i] = min(moved[i], highest)
+        highest = moved[i] - least
     return [moved[i] for i in range(len(heights))]
 
 

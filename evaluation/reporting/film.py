@@ -87,11 +87,7 @@ def drawn(trajectory: Trajectory, platform: Platform, time: float, size: tuple[i
 
 
 def check_suffix(path: Path) -> str:
-    """The kind of a film's file.
-
-    Raises:
-        DataError: it is none of :data:`SUFFIXES`.
-    """
+    """The kind of a film's file."""
     if path.suffix.lower() not in SUFFIXES:
         raise DataError(f"{path}: name a file that ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     return path.suffix.lower()
@@ -111,17 +107,13 @@ def save_film(path: str | Path, frames: Iterable[Picture], rate: float) -> None:
     if first is None:
         raise DataError(f"{path}: a film needs at least one frame")
     if suffix == ".png":
-        write_bytes(path, _png(first))
+        buffer = io.BytesIO()
+        _image(first).save(buffer, format="PNG", optimize=True)
+        write_bytes(path, buffer.getvalue())
     elif suffix == ".gif":
         write_bytes(path, _gif(first, remaining, rate))
     else:
         write_bytes(path, _mp4(first, remaining, rate))
-
-
-def _png(frame: Picture) -> bytes:
-    buffer = io.BytesIO()
-    _image(frame).save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
 
 
 def gif_rate(rate: float) -> float:

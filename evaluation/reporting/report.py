@@ -1,20 +1,27 @@
-"""One HTML page with everything: it embeds its figures and needs no network."""
+"""The report: one HTML page with everything. It embeds its figures and needs no network.
+
+:func:`definitions` makes the tables of the page of metrics from their declarations in ``metrics.py``.
+"""
 
 from __future__ import annotations
 
 import base64
+import dataclasses
+import inspect
+import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import yaml
 from jinja2 import Environment, StrictUndefined
 
 from ...envs.settings import to_dict
 from ...envs.storage import write_text
 from ..benchmark import benchmark_table
-from ..metrics import METRICS
+from ..metrics import METRICS, ActuatorMetrics, AxisMetrics, Criteria, Metrics, References, declared
 from ..results import Results
 from .tables import (
     axis_table,
@@ -25,6 +32,7 @@ from .tables import (
     score_table,
     suite_table,
 )
+from .text import NOTHING, TextTable, markdown
 
 _DARKEST: Final = 0.35
 """Opacity of the best cell of a row."""
@@ -35,7 +43,7 @@ def render(results: Results, figures: Mapping[str, bytes], benchmark: bytes | No
 
     Args:
         results: What to report.
-        figures: PNG by maneuver; those missing are left out.
+        figures: PNG by maneuver, as far as there are any.
         benchmark: PNG of the benchmark.
     """
     source = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
@@ -90,3 +98,46 @@ def _heat(results: Results) -> list[list[float | None]]:
         row = [errors.get(name) for name in results.policies]
         shades.append([None if j is None else round(_DARKEST * (best / j if j else 1.0), 3) for j in row])
     return shades
+
+
+_BETTER: Final = {"lower": "Lower is better.", "higher": "Higher is better.", "": ""}
+
+
+def definitions() -> dict[str, str]:
+    """Tables in Markdown: the metrics of a drive, of an axis and of an actuator, and the thresholds."""
+    return {
+        "metrics-drive": _metrics(Metrics),
+        "metrics-axis": _metrics(AxisMetrics),
+        "metrics-actuator": _metrics(ActuatorMetrics),
+        "criteria": _thresholds(),
+    }
+
+
+def _metrics(cls: type[Any]) -> str:
+    rows = [
+        (
+            f"`{one.name}`",
+            one.title if one.header else NOTHING,
+            " ".join(filter(None, (one.definition, _BETTER[one.better], one.source))),
+            one.unit,
+            one.over_drives.__name__,
+        )
+        for one in declared(cls)
+    ]
+    header = ("metric", "in tables", "definition", "SI unit", "over drives")
+    return markdown(TextTable("", header, tuple(rows))) + "\n"
+
+
+def _thresholds() -> str:
+    arguments = (inspect.getdoc(Criteria) or "").partition("Args:\n")[2]
+    meanings = dict(re.findall(r"^    (\w+): ((?:.|\n {8})+)", arguments, flags=re.MULTILINE))
+    criteria = Criteria()
+    rows = []
+    for field in dataclasses.fields(Criteria):
+        value = getattr(criteria, field.name)
+        values = (
+            dataclasses.astuple(value) if isinstance(value, References) else np.atleast_1d(value).tolist()
+        )
+        shown = [f"`{one}`" if isinstance(one, str) else f"{one:.4g}" for one in values]
+        rows.append((f"`{field.name}`", ", ".join(shown), " ".join(meanings[field.name].split())))
+    return markdown(TextTable("", ("field", "default", "meaning"), tuple(rows))) + "\n"

@@ -12,7 +12,7 @@ from ..comparison import NormalizedScore
 from ..metrics import CUE_AXES, METRICS, OF_AXIS, ActuatorMetrics, AxisMetrics, Metrics, Table, declared
 from ..results import Results
 from ..suite import print_troubles
-from .text import NOTHING, TextTable, degrees, fraction, is_missing, number, percent, print_table
+from .text import NOTHING, TextTable, degrees, fraction, is_missing, number, percent, print_note, print_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,13 +74,7 @@ def has_scores(frame: pd.DataFrame) -> bool:
 def maneuver_table(
     maneuver: str, drives: Mapping[str, Metrics], scores: Mapping[str, NormalizedScore] | None = None
 ) -> TextTable:
-    """The headline metrics of each policy on one maneuver, best first.
-
-    Args:
-        maneuver: For the title.
-        drives: Metrics by policy.
-        scores: Normalized scores by policy.
-    """
+    """The headline metrics of each policy on one maneuver, best first."""
     import pandas as pd
 
     rows = []
@@ -206,9 +200,7 @@ def print_results(console: Console, results: Results) -> None:
     ]
     print_troubles(console, counted)
     for policy, reason in results.skipped.items():
-        console.print(f"[bold]skipped[/bold] {escape(policy)}: {escape(reason)}", highlight=False)
+        print_note(console, "skipped", f"{policy}: {reason}")
     for failure in results.failures:
         what = f"{failure.maneuver}, {failure.policy}" if failure.policy else failure.maneuver
-        console.print(
-            f"[bold red]failed[/bold red] {escape(what)}: {escape(failure.message)}", highlight=False
-        )
+        print_note(console, "failed", f"{what}: {failure.message}")

@@ -143,6 +143,12 @@ def _blocks(widths: Sequence[int], width: int) -> Iterator[list[int]]:
     yield block
 
 
+def print_note(console: Console, kind: str, text: str) -> None:
+    """A line about a policy or a drive: "counted", "skipped", or "failed", which is red."""
+    style = "bold red" if kind == "failed" else "bold"
+    console.print(f"[{style}]{kind}[/{style}] {escape(text)}", highlight=False)
+
+
 def markdown(table: TextTable) -> str:
     """A table as Markdown; the rows to stress are bold."""
     lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
@@ -166,12 +172,7 @@ def save_markdown(path: str | Path, *parts: TextTable | str) -> None:
 
 
 def words_of(name: str, command: Any) -> list[str]:
-    """The command line that makes a result again: the options that differ from their default.
-
-    Args:
-        name: Of the subcommand.
-        command: Its dataclass of arguments.
-    """
+    """The command line that makes a result again: the options that differ from their default."""
     words = ["motion-cueing", name]
     for option in fields(command):
         value = getattr(command, option.name)

@@ -47,8 +47,8 @@ class SensorNoise:
     """White noise, new in every time step; the defaults are of the class of a cheap inertial sensor.
 
     Args:
-        force: Standard deviation on each axis of the specific force wanted and felt, m/s^2.
-        rate: Standard deviation on each axis of the angular velocity wanted and felt, rad/s (0.3 deg/s).
+        force: Standard deviation on each axis of the specific force of both cues, m/s^2.
+        rate: Standard deviation on each axis of the angular velocity of both cues, rad/s (0.3 deg/s).
         seed: Of the noise, which is the same for every policy.
     """
 
@@ -81,10 +81,6 @@ class _NoisyInterface(Interface):
 
     Differences of cues get the difference of their noise. Rows of simulator cues that a model gives, not
     sensors, get none.
-
-    Args:
-        inner: The interface.
-        noise: Of the sensors.
     """
 
     def __init__(self, inner: Interface, noise: SensorNoise) -> None:
@@ -235,7 +231,7 @@ class Study:
         policy = make_policy(given, self.platform, force=True)
         if policy.needs_drive and given in self.causal:
             raise ConfigurationError(
-                f"{given} is told the drive before it begins; give --policies {given} to see it all the same"
+                f"{given} knows the drive before it begins; name it in --policies to drive it all the same"
             )
         return policy
 

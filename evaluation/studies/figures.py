@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
-from numpy.typing import NDArray
 
 from ..reporting.figures import CAR, FLOOR, LOWEST_SCORE, line_styles, new_figure, styled
 from ..reporting.tables import SCORES
@@ -111,9 +110,11 @@ def heat_figure(results: StudyResults) -> Figure | None:
         axes = figure.subplots()
         axes.grid(visible=False)
         scale = LogNorm(1.0 / _WORST_RATIO, _WORST_RATIO)
-        image = axes.imshow(_ratios(results), cmap="RdBu_r", norm=scale, aspect="auto", alpha=0.85)
-        for i, policy in enumerate(policies):
-            for j, summary in enumerate(results.across(policy)):
+        cells = [results.across(policy) for policy in policies]
+        ratios = [[math.nan if s is None or not s.ratio else s.ratio for s in row] for row in cells]
+        image = axes.imshow(np.array(ratios), cmap="RdBu_r", norm=scale, aspect="auto", alpha=0.85)
+        for i, row in enumerate(cells):
+            for j, summary in enumerate(row):
                 color = "white" if summary is not None and (summary.ratio or 1.0) > _BRIGHT else CAR
                 text = _cell(summary, j == 0)
                 axes.text(j, i, text, ha="center", va="center", fontsize=8, color=color)
@@ -127,12 +128,6 @@ def heat_figure(results: StudyResults) -> Figure | None:
         drives = how_many(len(results.maneuvers), "drive")
         axes.set_title(f"J, J over {names[0]}, time at a limit; mean over {drives}")
     return figure
-
-
-def _ratios(results: StudyResults) -> NDArray[np.float64]:
-    """(policies, conditions) J over that under the first condition; NaN where there is none."""
-    rows = [results.across(policy) for policy in results.driven]
-    return np.array([[math.nan if s is None or not s.ratio else s.ratio for s in row] for row in rows])
 
 
 def _cell(summary: Summary | None, first: bool) -> str:

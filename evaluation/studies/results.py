@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
-from rich.markup import escape
 
 from ...envs.settings import configuration, renamed
 from ..comparison import normalized_scores
 from ..metrics import METRICS, Criteria, Metrics, over_drives
 from ..reporting.tables import SCORES, Cell, policy_table
-from ..reporting.text import NOTHING, TextTable, fraction, how_many, number, percent, print_table
-from ..results import save_frame
-from ..saved import Headed
+from ..reporting.text import NOTHING, TextTable, fraction, how_many, number, percent, print_note, print_table
+from ..results import Headed, save_frame
 from ..suite import print_troubles
 
 SCHEMA: Final = 2
@@ -268,9 +266,7 @@ def print_study(console: Console, results: StudyResults, title: str, ratios: boo
     ]
     print_troubles(console, counted)
     for line in results.skipped_lines():
-        console.print(f"[bold]skipped[/bold] {escape(line)}", highlight=False)
+        print_note(console, "skipped", line)
     for failure in results.failures:
         who = ", ".join(part for part in (failure.condition, failure.policy, failure.maneuver) if part)
-        console.print(
-            f"[bold red]failed[/bold red] {escape(who)}: {escape(failure.message)}", highlight=False
-        )
+        print_note(console, "failed", f"{who}: {failure.message}")

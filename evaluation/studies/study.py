@@ -5,21 +5,114 @@ A finished drive is kept, so that a study that was interrupted, or is extended, 
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ...baselines.policy import Policy
 from ...envs.car import Car
 from ...envs.cues import CueTrace
-from ...envs.errors import MotionCueingError
+from ...envs.errors import DataError, MotionCueingError
 from ...envs.platform import Platform
+from ...envs.settings import configuration, to_dict
+from ...envs.storage import write_text
 from ..metrics import Metrics, measure
+from ..reporting.text import plain_name
+from ..results import drive_key, load_drives_done
 from ..rollout import rollout, statistics_of
 from ..suite import CueSource, explain
 from .results import StudyFailure
-from .store import KeptDrive, PairStore, drive_key, identity
+
+_FOLDER: Final = "pairs"
+
+
+@configuration
+class KeptDrive:
+    """One drive.
+
+    Args:
+        key: Of everything that it depends on; see :func:`~..results.drive_key`.
+        metrics: What it came to.
+        notes: What the policy counted.
+    """
+
+    key: str
+    metrics: Metrics
+    notes: dict[str, str]
+
+
+@configuration
+class KeptPair:
+    """The drives of one policy under one condition."""
+
+    condition: str
+    policy: str
+    drives: dict[str, KeptDrive]
+
+
+class PairStore:
+    """Keeps the drives of one policy under one condition, in ``pairs`` of the folder of a study."""
+
+    def __init__(self, folder: Path, condition: str, policy: str) -> None:
+        tag = hashlib.sha256(f"{condition}\n{policy}".encode()).hexdigest()[:6]
+        name = f"{plain_name(condition)}--{plain_name(policy)}-{tag}.json"
+        self._path = folder / _FOLDER / name
+        empty = KeptPair(condition, policy, {})
+        self._pair = load_drives_done(KeptPair, self._path, "a study") if self._path.exists() else empty
+
+    def find(self, maneuver: str, key: str) -> KeptDrive | None:
+        """A drive that is done, if nothing about it has changed."""
+        kept = self._pair.drives.get(maneuver)
+        return kept if kept is not None and kept.key == key else None
+
+    def keep(self, maneuver: str, drive: KeptDrive) -> None:
+        """Write a drive down at once, whole or not at all."""
+        self._pair.drives[maneuver] = drive
+        write_text(self._path, json.dumps(to_dict(self._pair), allow_nan=False) + "\n")
+
+
+def forget_kept(folder: Path) -> None:
+    """Remove the drives of a study from its folder, and nothing else that lies there."""
+    for path in _files(folder):
+        path.unlink()
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted((folder / _FOLDER).glob("*.json"))
+
+
+def check_kept(folder: Path) -> None:
+    """Refuse damaged files of drives in the folder of a study, all at once."""
+    damaged = []
+    for path in _files(folder):
+        try:
+            load_drives_done(KeptPair, path, "a study")
+        except DataError:
+            damaged.append(str(path))
+    if damaged:
+        raise DataError(
+            f"{', '.join(damaged)}: damaged, not the drives of a study; delete them, or add --fresh"
+        )
+
+
+def identity(given: Any, policy: Policy) -> dict[str, Any]:
+    """What a policy is, as plain values: its name or the content of its file, and its parameters.
+
+    Args:
+        given: Its name or file, or the policy itself.
+        policy: The policy.
+    """
+    name = given if isinstance(given, str) else policy.name
+    # Of a class in a file, `file.py:Class`, the file.
+    path = Path(name.rpartition(".py:")[0] + ".py" if ".py:" in name else name)
+    return {
+        "name": name,
+        "file": hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None,
+        "parameters": None if policy.parameters is None else to_dict(policy.parameters),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +127,7 @@ class Condition:
         maneuvers: Sources of cues by name.
         make: The policy for this condition, of a name or file or a policy itself; a MotionCueingError skips
             it.
-        about: What else makes a drive what it is, as plain values: a drive that is kept is of the same.
+        about: Everything else that a drive depends on, as plain values.
     """
 
     name: str
@@ -65,17 +158,6 @@ class StudyOutcome:
     driven: int = 0
 
 
-@dataclass(frozen=True, eq=False)
-class _Pair:
-    """One policy under one condition, and where its drives are kept."""
-
-    condition: Condition
-    label: str
-    policy: Policy
-    identity: Mapping[str, Any]
-    store: PairStore
-
-
 class _Study:
     """A study under way: drives pairs, and collects the outcome."""
 
@@ -96,9 +178,35 @@ class _Study:
                 for _ in condition.maneuvers:
                     self._progress(condition.name, label)
                 continue
+            metrics[label] = {}
             store = PairStore(self._folder, condition.name, label)
-            pair = _Pair(condition, label, policy, identity(given, policy), store)
-            metrics[label] = self._drive_pair(pair, cues)
+            about = {
+                "platform": to_dict(condition.platform),
+                "car": to_dict(condition.car),
+                "about": dict(condition.about),
+                "policy": identity(given, policy),
+            }
+            for maneuver in condition.maneuvers:
+                self._progress(f"{condition.name}, {maneuver}", label)
+                if maneuver not in cues:
+                    continue
+                # A policy is a user's code: whatever it raises must not cost the other drives.
+                try:
+                    key = drive_key(**about, cues=cues[maneuver].digest())
+                    done = store.find(maneuver, key)
+                    if done is None:
+                        drive = rollout(policy, cues[maneuver], condition.platform, condition.car)
+                        done = KeptDrive(key, measure(drive), statistics_of(drive.metadata))
+                        store.keep(maneuver, done)
+                        self.outcome.driven += 1
+                except Exception as error:
+                    failure = StudyFailure(condition.name, label, maneuver, explain(error))
+                    self.outcome.failures.append(failure)
+                    continue
+                metrics[label][maneuver] = done.metrics
+                if done.notes:
+                    by_policy = self.outcome.statistics.setdefault(condition.name, {})
+                    by_policy.setdefault(label, {})[maneuver] = done.notes
 
     def _cues(self, condition: Condition) -> dict[str, CueTrace]:
         cues: dict[str, CueTrace] = {}
@@ -108,39 +216,6 @@ class _Study:
             except Exception as error:
                 self.outcome.failures.append(StudyFailure(condition.name, None, maneuver, explain(error)))
         return cues
-
-    def _drive_pair(self, pair: _Pair, cues: Mapping[str, CueTrace]) -> dict[str, Metrics]:
-        """Metrics by maneuver."""
-        condition, label = pair.condition.name, pair.label
-        metrics: dict[str, Metrics] = {}
-        for maneuver in pair.condition.maneuvers:
-            self._progress(f"{condition}, {maneuver}", label)
-            if maneuver not in cues:
-                continue
-            # A policy is a user's code: whatever it raises must not cost the other drives.
-            try:
-                kept = self._drive(pair, maneuver, cues[maneuver])
-            except Exception as error:
-                self.outcome.failures.append(StudyFailure(condition, label, maneuver, explain(error)))
-                continue
-            metrics[maneuver] = kept.metrics
-            if kept.notes:
-                by_policy = self.outcome.statistics.setdefault(condition, {})
-                by_policy.setdefault(label, {})[maneuver] = kept.notes
-        return metrics
-
-    def _drive(self, pair: _Pair, maneuver: str, cues: CueTrace) -> KeptDrive:
-        """A drive that is kept, or is driven now."""
-        condition = pair.condition
-        key = drive_key(condition.platform, condition.car, condition.about, pair.identity, cues)
-        kept = pair.store.find(maneuver, key)
-        if kept is not None:
-            return kept
-        drive = rollout(pair.policy, cues, condition.platform, condition.car)
-        kept = KeptDrive(key, measure(drive), statistics_of(drive.metadata))
-        pair.store.keep(maneuver, kept)
-        self.outcome.driven += 1
-        return kept
 
 
 def run_study(

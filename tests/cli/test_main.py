@@ -125,7 +125,7 @@ def test_after_an_interrupt_the_same_command_goes_on(name, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     module = import_module(COMMANDS[name].module, "motion_cueing.cli")
-    monkeypatch.setattr(module, "run", interrupt)
+    monkeypatch.setattr(module, COMMANDS[name].run, interrupt)
     done = "interrupted; what is done is kept, and the same command"
     assert complaint(capsys, [name], 130) == f"motion-cueing {name}: {done} goes on"
     assert complaint(capsys, [name, "--fresh"], 130).endswith(f"{done} without --fresh goes on")
@@ -378,7 +378,7 @@ def test_an_output_folder_that_is_a_file_is_refused(tmp_path, capsys):
 def test_list_shows_every_kind(capsys):
     assert main(["list"]) == 0
     shown = capsys.readouterr().out
-    for name in ("no-motion", "steady-turn", "city-drive", "paper", "sedan"):
+    for name in ("no-motion", "steady-turn", "city-drive", "paper", "sedan", "dagger"):
         assert name in shown
 
 

@@ -10,12 +10,10 @@ import threading
 import numpy as np
 import pytest
 
-from motion_cueing.cli import drive as drive_command
 from motion_cueing.cli import serve as serve_command
-from motion_cueing.cli.drive import DriveCommand
 from motion_cueing.cli.evaluate import EvaluateCommand, make_plan
 from motion_cueing.cli.main import main
-from motion_cueing.cli.serve import ServeCommand
+from motion_cueing.cli.serve import DriveCommand, ServeCommand
 from motion_cueing.evaluation import Trajectory
 from motion_cueing.evaluation.suite import run_suite
 from motion_cueing.realtime.report import SCHEMA, LoopReport
@@ -49,7 +47,7 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, ending, t
 
     def drive():
         try:
-            statuses.append(drive_command.run(driving))
+            statuses.append(serve_command.run_drive(driving))
         finally:
             signal.raise_signal(ending)
 

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from motion_cueing.cli import train as train_command
-from motion_cueing.cli import training as training_options
 from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.settings import load
@@ -220,7 +219,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
 
 
 def test_a_missing_package_is_told(monkeypatch):
-    monkeypatch.setattr(training_options, "find_spec", lambda name: None if name == "torch" else object())
+    monkeypatch.setattr(train_command, "find_spec", lambda name: None if name == "torch" else object())
     with pytest.raises(ConfigurationError, match=r"needs torch: pip install 'motion-cueing-gym\[train\]'"):
         train_command.run(train_command.TrainCommand(algorithm="ppo"))
 

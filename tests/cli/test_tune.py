@@ -15,7 +15,7 @@ from motion_cueing.baselines.tuning.search import Status, TuningOptions, load_re
 from motion_cueing.baselines.washout import load_washout
 from motion_cueing.baselines.washout.families import algorithm_of, load_parameters
 from motion_cueing.cli.main import main
-from motion_cueing.cli.tune import Telling, _spared
+from motion_cueing.cli.tune import SearchProgress, _spared
 from motion_cueing.envs.maneuvers import random_drives
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.progress import Bars
@@ -196,7 +196,7 @@ def test_every_family_is_tuned_the_same_way(algorithm, start, words, tmp_path, c
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (["--method", "gradient"], "the adaptive washout has no gradient; use method cma"),
+        (["--method", "gradient"], "washout has no gradient; use method cma"),
         (
             ["--start", "classical"],
             "a set of the classical washout; give one of the adaptive washout",
@@ -213,7 +213,7 @@ def test_progress_is_a_bar_on_a_terminal_and_some_lines_elsewhere():
     for terminal in (True, False):
         text = io.StringIO()
         with Bars(Console(file=text, force_terminal=terminal, width=100)) as bars:
-            show = Telling(bars, 10.0)
+            show = SearchProgress(bars, 10.0)
             for step in range(101):
                 show(Status(0.1 * step, 3.0 - 0.01 * step if step else None, step))
         shown[terminal] = text.getvalue()

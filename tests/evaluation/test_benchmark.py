@@ -12,7 +12,6 @@ import pytest
 from motion_cueing.cli.arguments import find_platform, find_policies
 from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.evaluation.benchmark import (
-    BENCHMARK,
     BENCHMARK_POLICIES,
     benchmark,
     benchmark_policies,
@@ -99,7 +98,7 @@ def test_the_benchmark_goes_from_no_motion_to_the_optimum():
 
 def test_benchmark_stands_for_its_policies_among_others():
     platform = find_platform("paper")
-    assert list(find_policies([BENCHMARK, "brk", "classical"], platform)) == [
+    assert list(find_policies(["benchmark", "brk", "classical"], platform)) == [
         *benchmark_policies(policy_names()),
         "brk",
     ]

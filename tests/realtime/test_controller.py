@@ -177,7 +177,7 @@ def test_a_machine_that_would_move_to_nowhere_stays_where_it_is(monkeypatch):
     answers = iter([np.full((2, 15), np.nan)])
     monkeypatch.setattr(bench.machine, "_view", lambda: next(answers, view()))
     bench.stand(0.01)
-    assert bench.controller.faults == ["the policy asked for accelerations beyond all numbers"]
+    assert bench.controller.faults == ["the policy requested accelerations beyond all numbers"]
     assert np.abs(bench.machine.motion[0] - where[0]).max() < 0.1
     bench.settle()
     bench.stand(0.2)

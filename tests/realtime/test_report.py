@@ -31,7 +31,7 @@ def report():
 
 def test_it_says_what_happened_and_leaves_zeros_out(report):
     assert summary_lines(report, "steps") == [
-        "399 periods in 1.5 s; deadlines missed: 4 (1.0000 %), 3 late and 1 left out",
+        "399 periods in 1.5 s; deadlines missed: 4 (1.0000 %), 3 late and 1 skipped",
         "packets: used 7, not finite 2",
         "steps: running 5",
         "RuntimeError: a mistake",

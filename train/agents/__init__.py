@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...baselines.registry import POLICY_FILES, describe_policy, policy_names, register
+from ...envs.errors import DataError
 from .names import FOLDER, SUFFIX, agent_names, description_in, is_agent
 
 if TYPE_CHECKING:
@@ -52,6 +53,14 @@ def _from_file(path: Path, platform: "Platform") -> "Agent":
     return Agent.load(path)
 
 
+def _from_zip(path: Path, platform: "Platform") -> "Agent":
+    make = "Agent(name, task, network_of(model), Record(algo='ppo', seed=0)).save('NAME.safetensors')"
+    raise DataError(
+        f"{path}: a model of Stable-Baselines3 does not say which environment it acts in; save it as an "
+        f"agent, by `{make}` with motion_cueing.train.algorithms.sb3.policy.network_of"
+    )
+
+
 def register_agents(folder: Path) -> None:
     """Give the agents in a folder the names of their files."""
     for path in sorted(folder.glob(f"*{SUFFIX}")):
@@ -60,3 +69,4 @@ def register_agents(folder: Path) -> None:
 
 register_agents(FOLDER)
 POLICY_FILES.register(SUFFIX.removeprefix("."), _from_file, "an agent")
+POLICY_FILES.register("zip", _from_zip, "refused, with the way to an agent")

@@ -9,24 +9,57 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...baselines.policy import TaskPolicy
-from ...baselines.washout import ClassicalWashout, WashoutParameters, load_washout
+from ...baselines.washout import ClassicalWashout, ScheduledWashout, WashoutParameters, load_washout
 from ...baselines.washout.classical.scheduled import KNOBS
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
 from ...envs.platform.kernels.step import AXES
 from ...envs.platform.machines import Platform
+from ...envs.task.drives import platform_of
 from ...envs.task.observation import Layout, layout_of
 from ...envs.task.options import TaskOptions
 from . import names
-from .base_policy import base_policy as make_base
 from .files import Record, contents_of, network_of, read, write
 from .names import SUFFIX, description_of
 from .network import Array, Network
+
+DEFAULT: Final = "classical"
+"""The washout where one is needed and none is named."""
+
+
+def base_parameters(
+    base: WashoutParameters | str | Path | None, task: TaskOptions
+) -> WashoutParameters | None:
+    """The washout that a task's action mode needs under the agent, or None.
+
+    Args:
+        base: Its parameters, preset or YAML file; None for :data:`DEFAULT`.
+        task: The environment.
+
+    Raises:
+        UnknownNameError: no washout has this name.
+        ConfigurationError: a base is named, but the action mode has none.
+    """
+    mode = task.action.mode
+    if mode not in ("residual", "gains"):
+        if base is not None:
+            raise ConfigurationError(f"base is of no use with task.action.mode {mode!r}; leave it out")
+        return None
+    return base if isinstance(base, WashoutParameters) else load_washout(base or DEFAULT)
+
+
+def base_policy(base: WashoutParameters | str | Path | None, task: TaskOptions) -> Any:
+    """The policy of :func:`base_parameters`, as the environment takes it, or None."""
+    parameters = base_parameters(base, task)
+    if parameters is None:
+        return None
+    kind = ScheduledWashout if task.action.mode == "gains" else ClassicalWashout
+    return kind(parameters, platform_of(task).cab)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +96,10 @@ class Agent(TaskPolicy):
         self._check_size("observation", self.network.size, self.layout.size)
         self._check_size("action", self.network.action_size, self.action_size)
 
-    def _check_size(self, what: str, found: int, expected: int) -> None:
-        if found != expected:
+    def _check_size(self, what: str, size: int, expected: int) -> None:
+        if size != expected:
             raise DataError(
-                f"agent {self.name}: its network has {found} entries of {what}, its task {expected}; "
+                f"agent {self.name}: its network has {size} entries of {what}, its task {expected}; "
                 f"give it the {what} options it was trained with"
             )
 
@@ -95,7 +128,7 @@ class Agent(TaskPolicy):
     @cached_property
     def base_policy(self) -> ClassicalWashout | None:
         """The washout that the environment needs as ``base``, or None."""
-        return None if self.base is None else make_base(self.base, self.task)
+        return None if self.base is None else base_policy(self.base, self.task)
 
     def predict(
         self,

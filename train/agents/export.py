@@ -138,7 +138,7 @@ def metadata(agent: Agent) -> dict[str, str]:
 
 
 def abilities_of(agent: Agent) -> dict[str, list[float]]:
-    """What an agent that is told its machine sees of it, in SI units; nothing for any other."""
+    """Description of the machine that the agent observes, in SI units; empty where it observes none."""
     if not agent.task.observation.machine:
         return {}
     return {name: values.tolist() for name, values in abilities(agent.platform).items()}

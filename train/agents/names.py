@@ -33,7 +33,7 @@ def description_of(algorithm: str, any_machine: bool, platform: str, mode: str) 
         platform: Name of the machine it was trained on.
         mode: Of its actions.
     """
-    machine = "any motion base, which it is told" if any_machine else f"the motion base {platform}"
+    machine = "any motion base, which it observes" if any_machine else f"the motion base {platform}"
     return f"agent by {algorithm} for {machine}, action {mode}"
 
 

@@ -62,7 +62,7 @@ class Job(Protocol):
         ...
 
     def run(self, report: Report) -> Any:
-        """Do it, or what is left of it."""
+        """Do the work, or the rest of it."""
         ...
 
 
@@ -91,7 +91,7 @@ class Listener(Protocol):
         ...
 
     def ended(self, job: Job, ending: Ending) -> None:
-        """How a job ended; the source is asked again after it."""
+        """How a job ended; the engine takes the next job after it."""
         ...
 
 
@@ -137,7 +137,7 @@ def run_jobs(engine: Engine, jobs: Sequence[Job], listener: Listener) -> tuple[d
     """
     left, endings = list(jobs), _Endings(listener)
     interrupted = engine.run(lambda: left.pop(0) if left else None, endings)
-    return endings.found, interrupted
+    return endings.by_name, interrupted
 
 
 class _Endings:
@@ -145,10 +145,10 @@ class _Endings:
 
     def __init__(self, listener: Listener) -> None:
         self.update, self._listener = listener.update, listener
-        self.found: dict[str, Ending] = {}
+        self.by_name: dict[str, Ending] = {}
 
     def ended(self, job: Job, ending: Ending) -> None:
-        self.found[job.name] = ending
+        self.by_name[job.name] = ending
         self._listener.ended(job, ending)
 
 
@@ -257,11 +257,7 @@ _Manager.register("Mailbox", Mailbox)
 
 
 class ProcessEngine(_Workers):
-    """Jobs in processes of this machine.
-
-    Args:
-        jobs: Processes.
-    """
+    """Jobs in processes of this machine."""
 
     def __init__(self, jobs: int) -> None:
         self._jobs = jobs
@@ -327,7 +323,7 @@ _ENVIRONMENT: Final = {
 _ALONE: Final = {
     # Ray listens on 127.0.0.1 alone, as it does on Windows and macOS by default.
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
-    # Other users of the machine are kept out, and no token is left in the home folder.
+    # Other users of the machine have no access, and no token stays in the home folder.
     "RAY_AUTH_MODE": "token",
     "RAY_AUTH_TOKEN": secrets.token_hex(32),
 }
@@ -341,9 +337,6 @@ class RayEngine(_Workers):
         jobs: At a time, of one thread each; one of more threads takes the place of as many. Default: one a
             core.
         address: HOST:PORT of a cluster, of which this machine is a node; default: this machine alone.
-
-    Raises:
-        ConfigurationError: Ray is not installed.
     """
 
     def __init__(self, jobs: int | None = None, address: str | None = None) -> None:
@@ -457,12 +450,7 @@ def _perform_on_ray(job: Job, mailbox: Any, arguments: list[str], folder: str) -
 
 
 def _knock(address: str) -> None:
-    """Refuse an address where nobody listens.
-
-    Raises:
-        ConfigurationError: it is no HOST:PORT.
-        DataError: nobody does.
-    """
+    """Refuse an address where nobody listens."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit():
         raise ConfigurationError(f"--address {address}: expected HOST:PORT, as 10.0.0.5:6379")

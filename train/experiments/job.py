@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import platform
 import traceback
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -26,7 +29,7 @@ class TrainingJob:
 
     Args:
         name: For people.
-        path: The folder, absolute; the training goes on from what is in it. The one above it exists.
+        path: The folder, absolute; a training in it goes on. Its parent exists.
         config: The training.
         until: Actions after which it pauses with a checkpoint; None for its end.
         parent: Folder of the training whose last checkpoint it starts from; None to begin anew.
@@ -39,12 +42,7 @@ class TrainingJob:
     parent: Path | None = None
 
     def run(self, report: Report) -> Outcome:
-        """Train; an outcome is interrupted where it was stopped before ``until``.
-
-        Raises:
-            DataError: the folder is not on this machine, or a checkpoint is damaged.
-            ConfigurationError: the configuration does not fit its algorithm.
-        """
+        """Train; an outcome is interrupted where it was stopped before ``until``."""
         if not self.path.parent.is_dir():
             raise DataError(
                 f"{self.path.parent} is not there on {platform.node()}; "
@@ -69,6 +67,13 @@ class TrainingJob:
 
     def _paused(self, status: Status) -> bool:
         return self.until is not None and status.steps >= self.until
+
+
+def write_table(path: Path, rows: Iterable[Iterable[object]]) -> None:
+    """Write rows as CSV, whole or not at all."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    write_text(path, text.getvalue())
 
 
 def inherit(run: RunFolder, parent: RunFolder) -> None:

@@ -9,8 +9,6 @@ stopped goes on to the same bits.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import shutil
@@ -28,24 +26,28 @@ from ..config import Choice, PopulationOptions, TrainingConfig
 from ..run import RunFolder, free_folder
 from ..training import rating
 from .engine import Ending, Engine, Listener, run_jobs
-from .job import TrainingJob
+from .job import TrainingJob, write_table
 from .search import check_space, varied
 
 Values = dict[str, Any]
 """What is varied, by path."""
 
 
-@dataclass(frozen=True)
-class Successor:
-    """How a member of the next generation starts.
+@dataclass
+class Member:
+    """A member in one generation.
 
     Args:
-        parent: The member of this generation whose checkpoint it goes on from.
-        values: What it trains with.
+        values: Its values, by path.
+        parent: Member of the generation before that it goes on from; None in the first.
+        rating: Of its last validation, lower is better; None until it is done.
+        best: Rating of the best agent among its ancestors and itself.
     """
 
-    parent: int
     values: Values
+    parent: int | None = None
+    rating: float | None = None
+    best: float | None = None
 
 
 def draw(space: Mapping[str, Choice], random: np.random.Generator) -> Values:
@@ -59,13 +61,13 @@ def next_generation(
     space: Mapping[str, Choice],
     options: PopulationOptions,
     random: np.random.Generator,
-) -> list[Successor]:
-    """Who goes on from whom.
+) -> list[Member]:
+    """Truncation selection and exploration: the members of the next generation.
 
     Args:
-        ratings: Of each member, lower is better; what is not finite is worst.
+        ratings: Of each member, lower is better; one that is not finite is worst.
         values: Of each member.
-        space: What they may be.
+        space: The choice of each field.
         options: Shares and factors.
         random: Of everything that is drawn.
 
@@ -80,10 +82,10 @@ def next_generation(
     successors = []
     for member, own in enumerate(values):
         if member not in worst:
-            successors.append(Successor(member, dict(own)))
+            successors.append(Member(dict(own), member))
             continue
         parent = int(random.choice(best))
-        successors.append(Successor(parent, explored(values[parent], space, options, random)))
+        successors.append(Member(explored(values[parent], space, options, random), parent))
     return successors
 
 
@@ -135,23 +137,6 @@ _SHAPES: Final = ("policy", "policy_kwargs", "net_arch", "activation_fn", "buffe
 """Hyperparameters that a checkpoint is made for."""
 
 
-@dataclass
-class Member:
-    """A member in one generation.
-
-    Args:
-        values: What it trains with, by path.
-        parent: Member of the generation before that it goes on from; None in the first.
-        rating: Of its last validation, lower is better; None until it is done.
-        best: Rating of the best agent among its ancestors and itself.
-    """
-
-    values: dict[str, Any]
-    parent: int | None = None
-    rating: float | None = None
-    best: float | None = None
-
-
 class Population:
     """A population in its folder.
 
@@ -171,11 +156,7 @@ class Population:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> Population:
-        """A new population.
-
-        Raises:
-            ConfigurationError: the folder is not empty, or the configuration is none of a population.
-        """
+        """A new population."""
         population = cls(free_folder(path, f"{config.algo}-population"), config)
         members = range(config.population.members)
         first = [Member(draw(config.search, population._random(0, member))) for member in members]
@@ -186,11 +167,7 @@ class Population:
 
     @classmethod
     def open(cls, path: Path) -> Population:
-        """A population that was begun.
-
-        Raises:
-            DataError: there is none, or its file is broken.
-        """
+        """A population that was begun."""
         population = cls(path, load(TrainingConfig, path / _CONFIG))
         try:
             state = json.loads((path / _STATE).read_text(encoding="utf-8"))
@@ -218,11 +195,7 @@ class Population:
         return self.path / "best.safetensors"
 
     def run(self, engine: Engine, listener: Listener) -> bool:
-        """Train until the last generation is done; returns whether Ctrl-C stopped it.
-
-        Raises:
-            DataError: a member failed, or none of a generation has a finite rating.
-        """
+        """Train until the last generation is done; returns whether Ctrl-C stopped it."""
         while True:
             if any(member.rating is None for member in self.generations[-1]):
                 endings, interrupted = run_jobs(engine, self.jobs(), listener)
@@ -240,24 +213,17 @@ class Population:
         until = number * self.interval if number < self.total else None
         folder = self._folder(number)
         folder.mkdir(parents=True, exist_ok=True)
-        return [
-            TrainingJob(
-                f"member-{i}", folder / f"member-{i}", self._config_of(i, member), until, self._parent(member)
-            )
-            for i, member in enumerate(latest)
-        ]
+        jobs, last_only = [], replace(self.config.checkpoints, keep=1)
+        for i, member in enumerate(latest):
+            seed = self.config.seed + i
+            config = varied(self.config, member.values, seed=seed, checkpoints=last_only)
+            before = self._folder(number - 1) / f"member-{member.parent}"
+            parent = None if member.parent is None else before
+            jobs.append(TrainingJob(f"member-{i}", folder / f"member-{i}", config, until, parent))
+        return jobs
 
     def _folder(self, number: int) -> Path:
         return self.path.resolve() / f"generation-{number:03d}"
-
-    def _parent(self, member: Member) -> Path | None:
-        if member.parent is None:
-            return None
-        return self._folder(len(self.generations) - 1) / f"member-{member.parent}"
-
-    def _config_of(self, index: int, member: Member) -> TrainingConfig:
-        last_only = replace(self.config.checkpoints, keep=1)
-        return varied(self.config, member.values, seed=self.config.seed + index, checkpoints=last_only)
 
     def _note(self, endings: Mapping[str, Ending]) -> None:
         wrong = [f"{name} ({ending.error})" for name, ending in endings.items() if ending.error is not None]
@@ -270,7 +236,9 @@ class Population:
         if not any(math.isfinite(member.rating or 0.0) for member in latest):
             raise DataError(f"generation {len(self.generations)}: no member's validation is finite")
         self._save()
-        self._forget_checkpoints(len(self.generations) - 1)
+        # The children of the generation before are done: its checkpoints are of no use any more.
+        for path in self._folder(len(self.generations) - 1).glob("*/checkpoints"):
+            shutil.rmtree(path)
 
     def _next_generation(self) -> None:
         """The next generation."""
@@ -278,14 +246,8 @@ class Population:
         ratings = [math.inf if member.rating is None else member.rating for member in latest]
         random = self._random(len(self.generations))
         values = [member.values for member in latest]
-        successors = next_generation(ratings, values, self.config.search, self.options, random)
-        self.generations.append([Member(successor.values, successor.parent) for successor in successors])
+        self.generations.append(next_generation(ratings, values, self.config.search, self.options, random))
         self._save()
-
-    def _forget_checkpoints(self, number: int) -> None:
-        """Nobody goes on from those of a generation whose children are done."""
-        for path in self._folder(number).glob("*/checkpoints"):
-            shutil.rmtree(path)
 
     def _finish(self) -> None:
         """The best agent there ever was, and that of the member that is best at the end."""
@@ -301,17 +263,14 @@ class Population:
     def _save(self) -> None:
         state = [[asdict(member) for member in members] for members in self.generations]
         write_text(self.path / _STATE, json.dumps(state, indent=1) + "\n")
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
         names = list(self.config.search)
-        table.writerow(["generation", "member", "parent", "rating", "best", *names])
+        rows: list[list[Any]] = [["generation", "member", "parent", "rating", "best", *names]]
         for number, members in enumerate(self.generations, start=1):
             for i, member in enumerate(members):
-                row = [
-                    "" if value is None else value for value in (member.parent, member.rating, member.best)
-                ]
-                table.writerow([number, i, *row, *(member.values[name] for name in names)])
-        write_text(self.path / _TABLE, text.getvalue())
+                # None becomes an empty cell.
+                row = [member.parent, member.rating, member.best]
+                rows.append([number, i, *row, *(member.values[name] for name in names)])
+        write_table(self.path / _TABLE, rows)
 
 
 def is_population(path: Path) -> bool:

@@ -6,8 +6,6 @@ populations. Its folder holds Optuna's journal, a folder for each trial, a table
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import shutil
 from collections.abc import Callable, Mapping
@@ -23,12 +21,11 @@ from optuna.trial import FrozenTrial, TrialState
 
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.settings import from_dict, load, save, to_dict
-from ...envs.storage import write_text
 from ..config import Choice, TrainingConfig
 from ..run import free_folder
 from ..training import Status, rating
 from .engine import Ending, Engine, Job, Listener
-from .job import TrainingJob
+from .job import TrainingJob, write_table
 
 JOURNAL: Final = "search.journal"
 """File with all trials, beside their folder."""
@@ -59,15 +56,10 @@ def varied(config: TrainingConfig, values: Mapping[str, Any], **fields: Any) -> 
 
 
 def check_space(config: TrainingConfig) -> None:
-    """Refuse a space with nothing in it, or whose ends are no configurations.
-
-    Raises:
-        ConfigurationError: there is nothing to vary, or a field cannot be set so.
-    """
+    """Refuse a space with nothing in it, or whose ends are no configurations."""
     if not config.search:
         raise ConfigurationError("search is empty; name fields to vary, as hyperparameters.learning_rate")
-    ends: tuple[Callable[[Choice], Any], ...] = (first, last)
-    for end in ends:
+    for end in (first, last):
         varied(config, {path: end(choice) for path, choice in config.search.items()})
 
 
@@ -86,11 +78,7 @@ def _number(choice: Choice, value: float) -> float | int:
 
 
 def _set(values: dict[str, Any], path: str, value: Any) -> None:
-    """Set a field by its path.
-
-    Raises:
-        ConfigurationError: the path does not lead through fields.
-    """
+    """Set a field by its path."""
     *parents, last_name = path.split(".")
     for name in parents:
         inner = values.setdefault(name, {})
@@ -101,7 +89,7 @@ def _set(values: dict[str, Any], path: str, value: Any) -> None:
 
 
 class Search:
-    """A search in its folder; what is there already counts.
+    """A search in its folder; finished trials count.
 
     Args:
         path: The folder.
@@ -117,11 +105,7 @@ class Search:
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig) -> Search:
-        """A new search.
-
-        Raises:
-            ConfigurationError: the folder is not empty, or there is nothing to search.
-        """
+        """A new search."""
         search = cls(free_folder(path, f"{config.algo}-search"), config)
         save(config, search.path / _CONFIG)
         (search.path / _TRIALS).mkdir(exist_ok=True)
@@ -130,11 +114,7 @@ class Search:
 
     @classmethod
     def open(cls, path: Path) -> Search:
-        """A search that was begun.
-
-        Raises:
-            DataError: there is none.
-        """
+        """A search that was begun."""
         if not is_search(path):
             raise DataError(f"--out {path}: no search was begun there ({JOURNAL} is missing)")
         return cls(path, load(TrainingConfig, path / _CONFIG))
@@ -185,15 +165,13 @@ class Search:
         """Write the table of all trials, and the configuration of the best."""
         trials = self._study(optuna.load_study).get_trials(deepcopy=False)
         names = list(self.config.search)
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["trial", "state", "result", *names])
+        rows: list[list[Any]] = [["trial", "state", "result", *names]]
         for trial in trials:
             result = "" if trial.value is None else f"{trial.value:.6g}"
             values = self._values(trial.params)
             row = [values.get(name, "") for name in names]
-            table.writerow([trial.number, trial.state.name.lower(), result, *row])
-        write_text(self.path / _TABLE, text.getvalue())
+            rows.append([trial.number, trial.state.name.lower(), result, *row])
+        write_table(self.path / _TABLE, rows)
         best = self.best()
         if best is not None:
             config = self._config_with(self._values(best.params))

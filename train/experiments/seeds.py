@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
+from rich.console import Console
+from typing_extensions import Self
 
 from ...envs.errors import DataError
+from ...envs.progress import Bar, Bars
 from ...envs.settings import configuration, load, save
-from ...envs.storage import write_text
 from ...envs.task.options import PositiveCount
 from ..config import TrainingConfig
-from ..progress import TrainingProgress
 from ..run import RunFolder, free_folder, is_training
-from ..training import Outcome
-from .engine import Ending, Engine, Listener, make_engine, run_jobs
-from .job import TrainingJob
+from ..training import Outcome, Status
+from .engine import Ending, Engine, Job, Listener, make_engine, run_jobs
+from .job import TrainingJob, write_table
 from .population import Population, is_population
 from .search import Search, is_search
 
@@ -44,34 +44,21 @@ class SeedsPlan:
 
 
 class Seeds:
-    """Trainings that differ in their seed, in folders ``seed-S`` of one folder.
-
-    Args:
-        path: The folder.
-        plan: Which there are.
-    """
+    """Trainings that differ in their seed, in folders ``seed-S`` of one folder."""
 
     def __init__(self, path: Path, plan: SeedsPlan) -> None:
         self.path, self.plan = path, plan
 
     @classmethod
     def create(cls, path: Path | None, config: TrainingConfig, count: int) -> Seeds:
-        """New trainings.
-
-        Raises:
-            ConfigurationError: the folder is not empty.
-        """
+        """New trainings."""
         seeds = cls(free_folder(path, f"{config.algo}-seeds"), SeedsPlan(config, count))
         save(seeds.plan, seeds.path / _PLAN)
         return seeds
 
     @classmethod
     def open(cls, path: Path, steps: int | None = None) -> Seeds:
-        """Trainings that were begun, perhaps with another length.
-
-        Raises:
-            DataError: there are none.
-        """
+        """Trainings that were begun, perhaps with another length."""
         plan = load(SeedsPlan, path / _PLAN)
         if steps is not None:
             plan = replace(plan, config=replace(plan.config, steps=steps))
@@ -87,7 +74,7 @@ class Seeds:
         return [TrainingJob(f"seed-{c.seed}", folder / f"seed-{c.seed}", c) for c in configs]
 
     def run(self, engine: Engine, listener: Listener) -> tuple[list[float], bool]:
-        """Train; what is done already stays.
+        """Train; finished trainings stay as they are.
 
         Returns:
             What the configuration calls best of each seed's best agent, and whether Ctrl-C stopped them.
@@ -104,12 +91,8 @@ class Seeds:
         return [result.status.best for result in results if not result.interrupted], interrupted
 
     def _report(self, endings: dict[str, Ending]) -> None:
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["seed", "state", "steps", "best", "last J"])
-        for job in self.jobs:
-            table.writerow([job.config.seed, *_row(endings.get(job.name))])
-        write_text(self.path / _TABLE, text.getvalue())
+        rows = [[job.config.seed, *_row(endings.get(job.name))] for job in self.jobs]
+        write_table(self.path / _TABLE, [["seed", "state", "steps", "best", "last J"], *rows])
 
 
 def is_seeds(path: Path) -> bool:
@@ -138,6 +121,66 @@ _INTERRUPTED: Final = 130
 _SUCCESS: Final = 0
 
 
+class TrainingProgress:
+    """A bar for each training on a terminal, and a line for each validation anywhere.
+
+    Shows one training (:meth:`tell`), or the jobs of an engine (as its listener).
+
+    Args:
+        total: Actions of one training, to show its bar before its first status.
+        console: Where to write; default: the error stream.
+    """
+
+    def __init__(self, total: int | None = None, console: Console | None = None) -> None:
+        self._all, self._bars = Bars(console), dict[str, Bar]()
+        if total is not None:
+            self._bars["training"] = self._all.add("training", total)
+
+    def __enter__(self) -> Self:
+        """Show bars."""
+        self._all.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove them."""
+        self._all.__exit__(kind, error, trace)
+
+    def tell(self, status: Status) -> None:
+        """Show the progress of the one training."""
+        self._show("training", status, "")
+
+    def update(self, job: Job, status: Status) -> None:
+        """Show the progress of a job."""
+        self._show(job.name, status, f"{job.name}: ")
+
+    def ended(self, job: Job, ending: Ending) -> None:
+        """Remove a job's bar."""
+        if job.name in self._bars:
+            self._bars.pop(job.name).remove()
+
+    def _show(self, name: str, status: Status, before: str) -> None:
+        bar = self._bars.get(name) or self._all.add(name, status.total)
+        self._bars[name] = bar
+        speed = bar.speed
+        bar.move(status.steps, note=f"{speed:,.0f} a second" if speed else "")
+        if status.news:
+            self._all.line(f"{before}{validation_line(status)}")
+
+
+def validation_line(status: Status) -> str:
+    """One line about the last validation."""
+    score = status.score
+    assert score is not None
+    washout = f" (classical washout {status.reference:.2f})" if status.reference is not None else ""
+    return (
+        f"{status.steps:>12,} steps  J {score.cue_error:.2f}{washout}, "
+        f"perceived {score.perceived_error:.2f}, reward {score.reward:.2f}, "
+        f"limited {100.0 * score.limited:.2f} %"
+    )
+
+
 @dataclass(frozen=True)
 class Place:
     """Where trainings run.
@@ -153,11 +196,7 @@ class Place:
     address: str | None = None
 
     def check(self) -> None:
-        """Refuse an engine that is not there before anything is written.
-
-        Raises:
-            ConfigurationError: a package is missing.
-        """
+        """Refuse an engine that is not there before anything is written."""
         make_engine(self.engine, self.jobs, self.address)
 
     @contextmanager
@@ -181,11 +220,7 @@ def kind_of(path: Path) -> str | None:
 
 
 def run_training(folder: RunFolder, place: Place) -> int:
-    """One training on an engine; returns the exit status.
-
-    Raises:
-        DataError: it failed.
-    """
+    """One training on an engine; returns the exit status."""
     folder.path.parent.mkdir(parents=True, exist_ok=True)
     job = TrainingJob("training", folder.path.resolve(), folder.config)
     with place.open() as (engine, progress):
@@ -199,7 +234,7 @@ def run_training(folder: RunFolder, place: Place) -> int:
 
 
 def report_training(folder: RunFolder, outcome: Outcome, words: str = "") -> int:
-    """Say what came of a training; returns the exit status."""
+    """Print the result of a training; returns the exit status."""
     steps = outcome.status.steps
     if outcome.interrupted:
         return _stopped(f"train --out {folder.path}{words}", f" after {steps:,} steps")

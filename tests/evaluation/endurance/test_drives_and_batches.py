@@ -18,8 +18,7 @@ from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.evaluation.endurance import NOMINAL, SLOWER, Endurance
-from motion_cueing.evaluation.endurance.checks import drive_and_check
-from motion_cueing.evaluation.endurance.run import seeded_drives
+from motion_cueing.evaluation.endurance.run import drive_and_check, seeded_drives
 from motion_cueing.evaluation.rollout import Rollout
 
 from ...train.agents import agent

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.platform.kinematics import leg_motion
 from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator
-from motion_cueing.evaluation.endurance.checks import KINDS, TOLERANCE, TrueLimits
+from motion_cueing.evaluation.endurance.run import KINDS, TOLERANCE, TrueLimits
 
 from ...envs.platform.platforms_under_test import PRESETS
 from ...reference import MachineModel

@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from motion_cueing.evaluation.metrics import ActuatorMetrics, AxisMetrics, Criteria, Metrics, declared
-from motion_cueing.evaluation.reporting.definitions import definitions
+from motion_cueing.evaluation.reporting.report import definitions
 
 
 def cells(table):

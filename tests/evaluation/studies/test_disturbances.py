@@ -7,10 +7,10 @@ import pytest
 
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.evaluation.results import drive_key
 from motion_cueing.evaluation.rollout import rollout
 from motion_cueing.evaluation.studies import disturbances
 from motion_cueing.evaluation.studies.disturbances import Disturbances, Study, time_scaled
-from motion_cueing.evaluation.studies.store import drive_key
 
 from .bends import PAPER, SEDAN, bend
 
@@ -81,9 +81,9 @@ def test_an_agent_meets_a_machine_it_does_not_know():
     assert lagging.make("learned-preview").platform == lagging.platform
 
 
-def test_a_policy_that_is_told_the_drive_is_left_out_where_it_must_be_causal():
+def test_a_policy_that_knows_the_drive_is_refused_where_it_must_be_causal():
     make = robust(["classical-per-maneuver"]).conditions()[0].make
-    with pytest.raises(ConfigurationError, match="told the drive"):
+    with pytest.raises(ConfigurationError, match="knows the drive"):
         make("classical-per-maneuver")
     assert robust().conditions()[0].make("classical-per-maneuver") is not None
 
@@ -91,7 +91,7 @@ def test_a_policy_that_is_told_the_drive_is_left_out_where_it_must_be_causal():
 def test_drives_under_noise_of_another_definition_are_not_of_the_same(monkeypatch):
     def key():
         noisy = next(one for one in robust().conditions() if one.name == "noise")
-        return drive_key(noisy.platform, noisy.car, noisy.about, {}, bend())
+        return drive_key(about=dict(noisy.about), cues=bend().digest())
 
     before = key()
     assert key() == before

@@ -26,8 +26,7 @@ from motion_cueing.evaluation.studies.results import (
     print_study,
     score_tables,
 )
-from motion_cueing.evaluation.studies.store import identity
-from motion_cueing.evaluation.studies.study import Condition, run_study
+from motion_cueing.evaluation.studies.study import Condition, identity, run_study
 
 from ..synthetic import drive
 from .bends import PAPER, SEDAN, bend

@@ -100,7 +100,7 @@ def test_an_agent_file_keeps_that_it_is_told(tmp_path):
     read = type(one).load(tmp_path / "any.safetensors")
     assert read.task.observation.machine
     assert read.task == one.task
-    assert "any motion base, which it is told" in read.description
+    assert "any motion base, which it observes" in read.description
     assert not agent().task.observation.machine
 
 

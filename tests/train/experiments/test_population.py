@@ -19,8 +19,8 @@ from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import Choice, PopulationOptions, TrainingConfig
 from motion_cueing.train.experiments.engine import make_engine
 from motion_cueing.train.experiments.population import Population, draw, explored, next_generation
+from motion_cueing.train.experiments.seeds import TrainingProgress
 from motion_cueing.train.logs import read_log
-from motion_cueing.train.progress import TrainingProgress
 from motion_cueing.train.run import RunFolder
 from motion_cueing.train.training import Training
 

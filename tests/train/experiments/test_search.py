@@ -17,8 +17,7 @@ from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig, load_config
 from motion_cueing.train.experiments.engine import make_engine
 from motion_cueing.train.experiments.search import Search, suggest
-from motion_cueing.train.experiments.seeds import Place, run_search
-from motion_cueing.train.progress import TrainingProgress
+from motion_cueing.train.experiments.seeds import Place, TrainingProgress, run_search
 from motion_cueing.train.training import Training
 
 from .. import tiny

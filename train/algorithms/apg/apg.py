@@ -3,7 +3,7 @@
 A round: drive a window in every environment with the policy (:class:`.backpropagation.Rollout`), lead the
 gradient of its cost back through time to the actions and on to the weights, take a step of the optimizer. No
 action is ever sampled. A window is a whole episode, or shorter; the next one then goes on where it ended,
-and a learned value can stand for what is still to come (:mod:`.value`; the short-horizon actor-critic,
+and a learned value can stand for the later cost (:mod:`.value`; the short-horizon actor-critic,
 SHAC).
 """
 
@@ -30,7 +30,7 @@ from ...agents import Network
 from ...config import TrainingConfig
 from ...networks import TORCH_ACTIVATIONS, Actor, linear_layers, normalize_by_rollout
 from ...registry import Boundary, Learner, State, restoring
-from ...training import start_actor, warm_cosine
+from ...training import check_episodes, start_actor, warm_cosine
 from .backpropagation import Rollout, clip_outliers
 from .value import ValueBootstrap, ValueOptions
 
@@ -76,7 +76,7 @@ class ApgHyperparameters:
 
 
 class ActorOptimizer:
-    """Adam with clipped gradients and a warm cosine schedule; hidden layers by Muon where asked for.
+    """Adam with clipped gradients and a warm cosine schedule; hidden layers optionally by Muon.
 
     Muon (Jordan et al. 2024) replaces the gradient of a layer's matrix by the nearest one with equal singular
     values: a step has its size in every direction, not only in the few where the cost is steep.
@@ -137,14 +137,7 @@ class ActorOptimizer:
 
 
 class ApgLearner(Learner):
-    """See :class:`~...registry.Learner`.
-
-    Args:
-        config: The training.
-
-    Raises:
-        ConfigurationError: a hyperparameter is wrong, or the task has no gradients.
-    """
+    """See :class:`~...registry.Learner`."""
 
     def __init__(self, config: TrainingConfig) -> None:
         given = from_dict(ApgHyperparameters, dict(config.hyperparameters), "hyperparameters")
@@ -236,7 +229,7 @@ class ApgLearner(Learner):
         self._logged += 1
 
     def scalars(self) -> dict[str, float]:
-        """Means since the last call, and what was skipped since the start for not being finite."""
+        """Means since the last call, and counts of skipped rounds and episodes, which were not finite."""
         means = {name: total / self._logged for name, total in self._sums.items()}
         self._sums, self._logged = {}, 0
         skipped = {
@@ -277,18 +270,11 @@ class ApgLearner(Learner):
 
 
 def _check(config: TrainingConfig, window: float | None) -> None:
-    duration = config.task.episode.duration
-    if duration is None:
-        raise ConfigurationError(
-            "task.episode.duration must say how long an episode is, s; 20 is a good start"
-        )
+    check_episodes(config, "gradients need the scales of the machine")
+    duration = config.task.episode.duration or 0.0
     if window is not None and not math.isclose(duration / window, max(round(duration / window), 1)):
         raise ConfigurationError(
             f"hyperparameters.window {window:g} must be a whole part of task.episode.duration {duration:g}"
         )
     if config.task.episode.terminate_on_failure:
         raise ConfigurationError("task.episode.terminate_on_failure has no gradient; leave it off for apg")
-    if config.normalize.observation or config.normalize.reward:
-        raise ConfigurationError("normalize must be off for apg: gradients need the scales of the machine")
-    if not str(config.device).startswith("cpu"):
-        raise ConfigurationError(f"device {config.device}: apg runs on the CPU")

@@ -25,9 +25,6 @@ class NumpyBackward:
     """An actor's forward and backward pass in NumPy, with weights held fixed.
 
     For the few rows of a batch this is several times faster than to record an autograd graph for each step.
-
-    Args:
-        actor: The policy.
     """
 
     def __init__(self, actor: Actor) -> None:

@@ -30,7 +30,7 @@ from ...agents import Network
 from ...config import TrainingConfig
 from ...networks import TORCH_ACTIVATIONS, Actor, normalize_by
 from ...registry import Boundary, Learner, State, restoring
-from ...training import start_actor, warm_cosine
+from ...training import check_episodes, start_actor, warm_cosine
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ _YAW = 2
 class Teacher:
     """A controller that labels the states of a batch of episodes, which it may or may not drive.
 
-    A controller that knows its drive is given what is left of it where the episode begins.
+    A controller that knows its drive is given the rest of it where the episode begins.
 
     Args:
         policy: Its name, or the YAML file of one.
@@ -173,10 +173,6 @@ class DaggerLearner(Learner):
 
     Args:
         config: The training; ``task.episode.duration`` is the length of an episode.
-
-    Raises:
-        ConfigurationError: a hyperparameter is wrong, or the task is one that a teacher cannot act in.
-        UnknownNameError: no policy has the teacher's name.
     """
 
     def __init__(self, config: TrainingConfig) -> None:
@@ -306,16 +302,11 @@ class DaggerLearner(Learner):
 
 
 def _check(config: TrainingConfig) -> None:
+    check_episodes(config, "apg goes on from its agents")
     task = config.task
-    if task.episode.duration is None:
-        raise ConfigurationError("task.episode.duration must say how long an episode of a round is, s")
     if task.episode.terminate_on_failure:
         raise ConfigurationError("task.episode.terminate_on_failure is of no use to dagger; leave it off")
     if task.action.mode != "acceleration":
         raise ConfigurationError(
             f"task.action.mode must be acceleration for dagger, found {task.action.mode}"
         )
-    if config.normalize.observation or config.normalize.reward:
-        raise ConfigurationError("normalize must be off for dagger: apg goes on from its agents")
-    if not str(config.device).startswith("cpu"):
-        raise ConfigurationError(f"device {config.device}: dagger runs on the CPU")

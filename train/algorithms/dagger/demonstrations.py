@@ -27,7 +27,7 @@ from ....envs.storage import write_bytes, write_text
 Floats = NDArray[np.float64]
 
 FORMAT: Final = 2
-"""Version of the format; a reader refuses others. 1 did not say what was driven."""
+"""Version of the format; a reader refuses others. 1 did not name the drive."""
 
 INDEX: Final = "index.json"
 
@@ -92,7 +92,7 @@ class DriveEntry:
         file: In the folder.
         sha256: Of the file.
         source: Where the cues come from.
-        cues: ``CueTrace.digest`` of what was driven, at the time step of the drive.
+        cues: ``CueTrace.digest`` of the cues, at the time step of the drive.
         steps: Time steps.
         cue_error: J of the drive.
         perceived_cue_error: Perceived J of the drive.

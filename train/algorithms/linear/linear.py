@@ -41,6 +41,7 @@ from ...agents import Network
 from ...config import TrainingConfig
 from ...networks import TORCH_ACTIVATIONS, Actor, start_linear
 from ...registry import Boundary, Learner, State, restoring
+from ...training import check_episodes
 
 Floats = NDArray[np.float64]
 
@@ -107,9 +108,6 @@ def coordinates(washout: LinearWashout, memories: int) -> Floats:
     Args:
         washout: The gains; shares that are not given are 0.
         memories: Time constants of the memory.
-
-    Raises:
-        ConfigurationError: there are more shares than time constants.
     """
     shares = []
     for name in ("carriage_shares", "tilt_shares"):
@@ -241,9 +239,6 @@ class LinearLearner(Learner):
 
     Args:
         config: The training; every candidate drives ``n_envs`` episodes of ``task.episode.duration``.
-
-    Raises:
-        ConfigurationError: a hyperparameter is wrong, or the task is one that has no linear washout.
     """
 
     def __init__(self, config: TrainingConfig) -> None:
@@ -335,14 +330,9 @@ class LinearLearner(Learner):
 
 
 def _check(config: TrainingConfig) -> None:
+    check_episodes(config, "gains need the scales of the machine")
     task = config.task
-    if task.episode.duration is None:
-        raise ConfigurationError("task.episode.duration must say how long the episodes are, s")
     if task.action.mode != "acceleration" or task.observation.stack > 1:
         raise ConfigurationError("linear needs task.action.mode acceleration and task.observation.stack 1")
     if task.action.frame != "cab" or task.observation.frame != "cab":
         raise ConfigurationError("task.action.frame and task.observation.frame must be cab for linear")
-    if config.normalize.observation or config.normalize.reward:
-        raise ConfigurationError("normalize must be off for linear: gains need the scales of the machine")
-    if not str(config.device).startswith("cpu"):
-        raise ConfigurationError(f"device {config.device}: linear runs on the CPU")

@@ -135,11 +135,7 @@ def _load_statistics(network: Network, normalize: VecNormalize | None, weight: f
 
 
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
-    """Layers from the observation to the action; whether a tanh follows; whether there is a skip connection.
-
-    Raises:
-        DataError: the policy is of another kind.
-    """
+    """Layers from observation to action; whether a tanh follows; whether there is a skip connection."""
     if isinstance(model.policy, RecurrentActorCriticPolicy):
         reason = "it has a memory, which no agent has; train PPO, SAC, TD3 or TQC"
     elif isinstance(model.policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy):
@@ -172,9 +168,9 @@ def _activation(layers: Iterable[nn.Module]) -> str:
     if not kinds:
         return "tanh"
     if len(kinds) > 1 or not kinds <= _NAMES.keys():
-        found = ", ".join(sorted(kind.__name__ for kind in kinds))
+        names = ", ".join(sorted(kind.__name__ for kind in kinds))
         hint = "; with use_sde set policy_kwargs.clip_mean to 0" if nn.Hardtanh in kinds else ""
         raise DataError(
-            f"the policy has layers {found}; a network has one of {', '.join(TORCH_ACTIVATIONS)}{hint}"
+            f"the policy has layers {names}; a network has one of {', '.join(TORCH_ACTIVATIONS)}{hint}"
         )
     return _NAMES[kinds.pop()]

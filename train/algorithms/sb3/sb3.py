@@ -24,7 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ....envs.errors import ConfigurationError, suggest
 from ...agents import Network
-from ...agents.base_policy import base_policy
+from ...agents.agent import base_policy
 from ...config import TrainingConfig
 from ...logs import Monitor
 from ...networks import TORCH_ACTIVATIONS
@@ -135,19 +135,18 @@ def _policy_kwargs(algorithm: type[BaseAlgorithm], given: Any) -> dict[str, Any]
 def _checked(where: str, value: Any, hint: Any) -> Any:
     """``value`` as the annotation has it."""
     if isinstance(value, str) and value.startswith(SCHEDULED):
-        return linear(_number(where, value.removeprefix(SCHEDULED)))
+        text = value.removeprefix(SCHEDULED)
+        try:
+            return linear(float(text))
+        except ValueError:
+            raise ConfigurationError(
+                f"{where}: expected a number after {SCHEDULED}, found {text!r}"
+            ) from None
     try:
         return TypeAdapter(hint, config=_LENIENT).validate_python(value)
     except ValidationError as error:
         reasons = " or ".join(dict.fromkeys(item["msg"] for item in error.errors()))
         raise ConfigurationError(f"{where}: {reasons} (found {value!r})") from None
-
-
-def _number(where: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ConfigurationError(f"{where}: expected a number after {SCHEDULED}, found {text!r}") from None
 
 
 def linear(initial: float) -> Callable[[float], float]:
@@ -171,14 +170,7 @@ CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3":
 
 
 class SB3Learner(Learner):
-    """A Stable-Baselines3 model with its environments; see :class:`~...registry.Learner`.
-
-    Args:
-        config: The training.
-
-    Raises:
-        ConfigurationError: a hyperparameter is unknown or of the wrong type.
-    """
+    """A Stable-Baselines3 model with its environments; see :class:`~...registry.Learner`."""
 
     def __init__(self, config: TrainingConfig) -> None:
         torch.set_num_threads(config.threads)
@@ -277,7 +269,7 @@ def _normalized(env: DrivingSimulatorVecEnv, config: TrainingConfig) -> VecNorma
 
 
 class _Callback(BaseCallback):
-    """Tells the monitor of every step, and the training of every boundary."""
+    """Calls the monitor at every step, and the training at every boundary."""
 
     def __init__(self, boundary: Boundary, monitor: Monitor, simulators: DrivingSimulatorVecEnv) -> None:
         super().__init__()

@@ -50,11 +50,7 @@ def restore(
     simulators: DrivingSimulatorVecEnv,
     normalize: VecNormalize | None,
 ) -> None:
-    """Put a model made of the same configuration into a state.
-
-    Raises:
-        DataError: the state is of another configuration or version.
-    """
+    """Put a model made of the same configuration into a state."""
     with restoring():
         _restore_model(state, model)
         _restore_replay(state["replay"], model)
@@ -96,13 +92,13 @@ def _restore_replay(saved: State | None, model: BaseAlgorithm) -> None:
 
 
 def _statistics(normalize: VecNormalize) -> dict[str, Any]:
-    found: dict[str, Any] = {"returns": normalize.returns}
+    statistics: dict[str, Any] = {"returns": normalize.returns}
     for name in ("obs_rms", "ret_rms"):
         moments = getattr(normalize, name, None)
         if moments is not None:
-            found[name] = {"mean": np.array(moments.mean), "var": np.array(moments.var)}
-            found[name]["count"] = float(moments.count)
-    return found
+            statistics[name] = {"mean": np.array(moments.mean), "var": np.array(moments.var)}
+            statistics[name]["count"] = float(moments.count)
+    return statistics
 
 
 def _restore_statistics(saved: State, normalize: VecNormalize) -> None:
