@@ -65,7 +65,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "BenchmarkCommand",
         "evaluate every controller of the benchmark, from no motion to the optimum",
         "--maneuvers lane-change --out benchmark",
-        "open report.html in --out; ladder.md has the table",
+        "open report.html in --out; benchmark.md has the table",
     ),
     "paper": Command(
         ".paper",
@@ -101,7 +101,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "ExportCommand",
         "write an agent as an ONNX file",
         "--policy learned --out learned.onnx",
-        "docs/agents.md says how to run the file",
+        "docs/guides/export-an-agent.md says how to run the file",
     ),
     "train": Command(
         ".train",
@@ -194,7 +194,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "DemonstrateCommand",
         "record drives of a controller to learn from",
         "--policy optimum --drives 32 --out demonstrations",
-        "docs/demonstrations.md says how to read the files",
+        "docs/guides/record-demonstrations.md says how to read the files",
         goes_on=True,
     ),
 }

@@ -1,4 +1,4 @@
-"""Results of an evaluation: ``results.json`` and ``results.csv``; see docs/results-format.md."""
+"""Results of an evaluation: ``results.json`` and ``results.csv``; see docs/reference/file-formats.md."""
 
 from __future__ import annotations
 
