@@ -134,8 +134,8 @@ def test_files_and_make_targets_exist():
         text = text_of(page)
         named = re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w/.-]+)`", text)
         missing += [f"{page.name}: {name}" for name in named if not (ROOT / name).exists()]
-        targets = set(re.findall(r"`make ([a-z]+)[^`]*`", text)) | set(
-            re.findall(r"^make ([a-z]+)", text, re.M)
+        targets = set(re.findall(r"`make ([a-z-]+)[^`]*`", text)) | set(
+            re.findall(r"^make ([a-z-]+)", text, re.M)
         )
         missing += [
             f"{page.name}: make {target}"
@@ -160,6 +160,28 @@ def test_commands_and_their_options_exist(capsys):
         known = set(re.findall(r"--[a-z][a-z0-9-]*", capsys.readouterr().out))
         wrong += [f"{name} {option}" for option in sorted(options - known)]
     assert wrong == []
+
+
+def test_code_names_pages_that_exist():
+    """In docstrings, comments, help texts and configuration: pages by their paths from the root."""
+    files = [ROOT / "Makefile", *ROOT.glob("*.py"), *ROOT.glob("*.toml"), *ROOT.glob("*.yml")]
+    for folder in FOLDERS:
+        files += [path for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".yaml", ".html")]
+    missing = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in files
+        for name in re.findall(r"\bdocs/[\w./-]+\.md\b", text_of(path))
+        if not (ROOT / name).exists()
+    ]
+    assert missing == []
+
+
+def test_the_architecture_names_every_folder():
+    """Packages and the packages in them, one line each."""
+    table = re.findall(r"^\| \**`([\w/]+)`\** \|", text_of(DOCS / "explanation" / "architecture.md"), re.M)
+    packages = [ROOT / name for name in ("envs", "baselines", "train", "evaluation", "realtime", "cli")]
+    folders = [*packages, *(path.parent for top in packages for path in top.glob("*/__init__.py"))]
+    assert sorted(table) == sorted(path.relative_to(ROOT).as_posix() for path in folders)
 
 
 def test_the_site_shows_every_page():
