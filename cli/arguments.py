@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter, Token
 
+from ..baselines.registry import POLICIES
 from ..envs.errors import ConfigurationError, DataError, MotionCueingError, UnknownNameError
 from ..envs.storage import is_file
 
@@ -251,7 +252,8 @@ def _stem(kind: str, name: str, known: Iterable[str]) -> str:
     if is_file(name):
         file = Path(_existing(kind, name)).name
         return file.removesuffix(".gz").removesuffix(".csv") if kind == "maneuver" else Path(file).stem
-    raise UnknownNameError(kind, name, known, {"ladder": BENCHMARK} if kind == "policy" else None)
+    renamed = {"ladder": BENCHMARK, **POLICIES.renamed} if kind == "policy" else None
+    raise UnknownNameError(kind, name, known, renamed)
 
 
 def _existing(kind: str, name: str) -> str:

@@ -358,7 +358,7 @@ def app_of(name: str, prefix: str = f"{PROGRAM} ") -> App:
     def run(command: Any) -> None:
         """Only its arguments count."""
 
-    run.__annotations__ = {"command": Annotated[kind, Parameter(name="*")]}
+    run.__annotations__ = {"command": Annotated[kind, Parameter(name="*", show=bool(fields(kind)))]}
     if not any(field.default is MISSING and field.default_factory is MISSING for field in fields(kind)):
         run.__defaults__ = (kind(),)
     app.default(run)

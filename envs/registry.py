@@ -41,7 +41,7 @@ class Registry(Generic[T]):
 
     def __init__(self, kind: str, group: str, renamed: Mapping[str, str] | None = None) -> None:
         self.kind, self.group = kind, group
-        self._renamed = dict(renamed or {})
+        self.renamed = dict(renamed or {})
         self._entries: dict[str, _Entry] = {}
         self._discovered = False
 
@@ -105,7 +105,7 @@ class Registry(Generic[T]):
     def _entry(self, name: str) -> _Entry:
         self._discover()
         if name not in self._entries:
-            raise UnknownNameError(self.kind, str(name), self._entries, self._renamed)
+            raise UnknownNameError(self.kind, str(name), self._entries, self.renamed)
         return self._entries[name]
 
     def _discover(self) -> None:
