@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter, Token
 
-from ..baselines.registry import POLICIES
 from ..envs.errors import ConfigurationError, DataError, MotionCueingError, UnknownNameError
 from ..envs.storage import is_file
 
@@ -252,7 +251,9 @@ def _stem(kind: str, name: str, known: Iterable[str]) -> str:
     if is_file(name):
         file = Path(_existing(kind, name)).name
         return file.removesuffix(".gz").removesuffix(".csv") if kind == "maneuver" else Path(file).stem
-    renamed = {"ladder": BENCHMARK, **POLICIES.renamed} if kind == "policy" else None
+    from ..baselines.registry import POLICIES
+
+    renamed = {**POLICIES.renamed, "ladder": BENCHMARK} if kind == "policy" else None
     raise UnknownNameError(kind, name, known, renamed)
 
 
