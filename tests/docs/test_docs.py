@@ -204,6 +204,24 @@ def test_the_readme_is_short():
     assert len(text_of(ROOT / "README.md").split()) < 700
 
 
+def test_the_readme_shows_the_figures_of_the_benchmark():
+    """J, perceived J, tilt rate and step time, to the digits of the README."""
+
+    def rows(page: Path) -> dict[str, list[str]]:
+        lines = [
+            line.strip("|* ").split("|") for line in text_of(page).splitlines() if line.startswith("| `")
+        ]
+        return {re.match(r"`([\w-]+)`", line[0])[1]: [cell.strip() for cell in line] for line in lines}
+
+    shown, measured = rows(ROOT / "README.md"), rows(DOCS / "results" / "benchmark.md")
+    assert len(shown) == 6
+    # The benchmark's page has a table by drive, too, whose first column is a maneuver.
+    for policy, (_, _, *cells) in shown.items():
+        for cell, column in zip(cells, (1, 2, 8, 11), strict=True):
+            digits = len(cell.partition(".")[2])
+            assert cell == f"{float(measured[policy][column]):.{digits}f}", policy
+
+
 def test_a_table_of_fields_has_every_field_with_its_default_and_meaning():
     @dataclass(frozen=True)
     class Inner:
