@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 class DemonstrateCommand:
     """Record drives of a controller as a dataset for learning.
 
-    Writes one .npz file a drive and index.json; see docs/demonstrations.md. Name drives with --maneuvers, ask
-    for random ones with --drives, or both.
+    Writes one .npz file a drive and index.json. Name drives with --maneuvers, ask for random ones with
+    --drives, or both. docs/guides/record-demonstrations.md describes the files.
     """
 
     policy: PolicyName = "optimum"

@@ -31,6 +31,7 @@ OLD_FLAGS: Final[Mapping[str, Mapping[str, str]]] = {
         "--search": "--search is a command of its own now: motion-cueing search --trials N",
         "--population": "--population is a command of its own now: motion-cueing population --members N",
     },
+    "robustness": {"--fierceness": "--fierceness is called --time-scaling now"},
     "tune": {"--budget": "--budget is called --hours now"},
     "endure": {"--only": "--only is called --seeds now"},
     "demonstrate": {"--random": "--random is called --drives now"},

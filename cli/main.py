@@ -106,7 +106,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "ExportCommand",
         "write an agent as an ONNX file",
         "--policy learned --out learned.onnx",
-        "docs/agents.md says how to run the file",
+        "docs/guides/export-an-agent.md says how to run the file",
     ),
     "train": Command(
         ".train",
@@ -204,7 +204,7 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "DemonstrateCommand",
         "record drives of a controller to learn from",
         "--policy optimum --drives 32 --out demonstrations",
-        "docs/demonstrations.md says how to read the files",
+        "docs/guides/record-demonstrations.md says how to read the files",
         goes_on=True,
     ),
 }
@@ -361,7 +361,7 @@ def app_of(name: str, prefix: str = f"{PROGRAM} ") -> App:
     def run(command: Any) -> None:
         """Only its arguments count."""
 
-    run.__annotations__ = {"command": Annotated[kind, Parameter(name="*")]}
+    run.__annotations__ = {"command": Annotated[kind, Parameter(name="*", show=bool(fields(kind)))]}
     if not any(field.default is MISSING and field.default_factory is MISSING for field in fields(kind)):
         run.__defaults__ = (kind(),)
     app.default(run)

@@ -35,8 +35,8 @@ class ServeCommand:
     """Run a policy as a controller in real time: cues come over UDP, set-points go out.
 
     Listens on this machine alone unless --host says otherwise. Ctrl-C brakes to neutral, writes the log and
-    the report, and ends. A policy that must know the whole drive beforehand cannot be served. docs/loop.md
-    describes the packets.
+    the report, and ends. A policy that must know the whole drive beforehand cannot be served.
+    docs/reference/real-time.md describes the packets.
     """
 
     policy: PolicyName = "classical-tuned"

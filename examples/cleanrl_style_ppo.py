@@ -2,8 +2,8 @@
 
 Run it with ``python examples/cleanrl_style_ppo.py --steps 200000``; ``--help`` shows every argument. The
 loop is that of CleanRL's ``ppo_continuous_action.py`` (Huang et al. 2022, JMLR 23:274), with one
-difference: an episode that is cut off has a future, so the value of the state it was cut off in counts. A
-batch that begins anew in the same step tells that state as ``final_obs``.
+difference: the value of the last state counts where an episode is truncated. A batch that begins anew in
+the same step has that state in ``final_obs``.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Args:
     num_steps: int = 128
     """Actions in each environment between two updates."""
     epochs: int = 10
-    """Passes over what was played."""
+    """Passes over a rollout."""
     minibatch: int = 2048
     """Actions in a gradient."""
     learning_rate: float = 1e-3
@@ -58,7 +58,7 @@ class Args:
     seed: int = 0
     """Of weights, noise and drives."""
     maneuver: str = "lane-change"
-    """What the agent is held against the washout on."""
+    """Maneuver on which the agent is compared with the washout."""
 
 
 class ActorCritic(nn.Module):
@@ -85,7 +85,7 @@ class ActorCritic(nn.Module):
 
 @dataclass
 class Rollout:
-    """What was played: (steps, environments, ...) each."""
+    """Experience: (steps, environments, ...) each."""
 
     observation: torch.Tensor
     action: torch.Tensor
@@ -122,7 +122,7 @@ def play(
 
 
 def advantages(played: Rollout, value_after: torch.Tensor, args: Args) -> torch.Tensor:
-    """(steps, environments) by generalized advantage estimation; nothing flows back over an episode's end."""
+    """(steps, environments) by generalized advantage estimation, within each episode."""
     found, carried, following = torch.zeros_like(played.reward), torch.zeros_like(value_after), value_after
     for k in reversed(range(len(found))):
         goes_on = 1.0 - played.ended[k].float()

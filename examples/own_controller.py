@@ -1,4 +1,4 @@
-"""A controller of your own: tilts the driver for lasting accelerations, and shoves him for short ones.
+"""A controller of your own: it tilts the cab for lasting accelerations, and moves it for short ones.
 
 Run it with ``python examples/own_controller.py``, with names of maneuvers if you like;
 docs/guides/add-a-controller.md explains it.

@@ -1,8 +1,8 @@
-"""Train an agent with Stable-Baselines3, and hold it against the washout that it corrects.
+"""Train an agent with Stable-Baselines3, and compare it with the washout that it corrects.
 
 Run it with ``python examples/train_with_stable_baselines3.py``, with a number of actions and a maneuver
 if you like; it needs the extra ``train``. ``motion-cueing train`` does more: validation, checkpoints,
-resuming. Maneuvers are for the comparison; what is trained on are random drives.
+resuming. The training uses random drives; maneuvers are for the comparison.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
         drives: Cue traces to drive instead of those of ``task.episode``.
         base: The base policy of the action modes "residual" and "gains".
         render_mode: "rgb_array" (:meth:`render` gives a frame), "human" (a window, at the pace of the
-            drive), or None; see ``docs/rendering.md``.
+            drive), or None; see ``docs/guides/films-and-pictures.md``.
         render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 

@@ -49,7 +49,8 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         copy: Whether observations are copies; else each step overwrites those of the one before.
         device: "cpu" or a CUDA device of Warp.
         render_mode: "rgb_array" (:meth:`render` gives a frame of each environment), "human" (a window that
-            shows the first one, at the pace of the drive), or None; see ``docs/rendering.md``.
+            shows the first one, at the pace of the drive), or None;
+            see ``docs/guides/films-and-pictures.md``.
         render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
         **fields: Fields of :class:`~.options.TaskOptions` to replace, as dataclasses or dictionaries.
 

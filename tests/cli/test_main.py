@@ -227,6 +227,11 @@ IMPORT = ("import", "log.csv", "--columns", "time=t", "--out", "cues.csv")
         (["evaluate", "--policy", "a"], "--policy is called --policies now."),
         (["evaluate", "--maneuver=hill"], "--maneuver is called --maneuvers now."),
         (["evaluate", "--policies", "ladder"], "unknown policy 'ladder'; it is called 'benchmark' now"),
+        (
+            ["evaluate", "--policies", "classical-ceiling"],
+            "unknown policy 'classical-ceiling'; it is called 'classical-per-maneuver' now",
+        ),
+        (["robustness", "--fierceness", "2"], "--fierceness is called --time-scaling now"),
         (["evaluate", "--paper"], "--paper is a command of its own now: motion-cueing paper."),
         (["evaluate", "--car", "sedan", "--car", "bmw-320i"], "--car is given more than once; give it once"),
         (["evaluate", "--maneuvers"], "--maneuvers needs at least one value"),

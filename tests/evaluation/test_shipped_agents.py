@@ -30,10 +30,10 @@ TILTS_MORE = {
         {"steady-turn", "braking", "acceleration", "step-steer", "stop-and-go"},
     ),
 }
-"""Where an agent misses the bar, as docs/agents.md says: drives with a larger tilt rate than the tuned
-washout's, and with a large one for longer."""
+"""Where an agent misses the bar, as docs/results/agents.md says: drives with a larger tilt rate than the
+tuned washout's, and with a large one for longer."""
 CHATTERS = {"learned-ppo"}
-"""As docs/agents.md says of it."""
+"""As docs/results/agents.md says of it."""
 BEST = "learned-preview"
 """Better on every single maneuver, too."""
 

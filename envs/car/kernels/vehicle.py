@@ -1,7 +1,7 @@
 """The vehicle model: single-track car with roll, pitch, tires and actuators (Warp).
 
-Equations carry the tags of docs/car.md. Velocities are those of the point B of the roll axis under the
-c.g., in the plane of the road: x forward, y right, z down.
+Equations carry the tags of docs/reference/car.md. Velocities are those of the point B of the roll axis
+under the c.g., in the plane of the road: x forward, y right, z down.
 """
 
 from __future__ import annotations

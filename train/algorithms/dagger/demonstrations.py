@@ -1,7 +1,7 @@
 """Drives of a controller as data to learn from: a folder of ``.npz`` files and an index.
 
-The format is documented in docs/demonstrations.md. A drive is written whole, then the index that names it;
-so a folder is valid at any time, and an interrupted recording goes on where it stopped.
+The format is documented in docs/guides/record-demonstrations.md. A drive is written whole, then the index
+that names it; so a folder is valid at any time, and an interrupted recording goes on where it stopped.
 """
 
 from __future__ import annotations
