@@ -50,7 +50,7 @@ from ..envs.errors import ConfigurationError, DataError
 from ..envs.platform.machines import Platform
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ..envs.simulator.simulator import N_AXES, TIME_STEP
-from ..envs.task.drives import platform_of
+from ..envs.task.episode import platform_of
 from ..envs.task.options import TaskOptions
 from .interface import Interface, MachineInterface, Machines, TaskInterface
 

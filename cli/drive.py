@@ -61,7 +61,7 @@ def run(command: DriveCommand) -> int:
     Raises:
         MotionCueingError: an argument is wrong.
     """
-    from ..envs.interrupt import Interrupt
+    from ..envs.progress import Interrupt
     from ..realtime.client import Client, NetworkFaults, cues_at
     from ..realtime.packets import make_format
     from ..realtime.server import Endpoint, address_of, is_loopback

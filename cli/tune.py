@@ -87,7 +87,7 @@ def run(command: TuneCommand) -> int:
         MotionCueingError: an argument or a file is wrong, or there is no search to go on with.
     """
     from ..baselines.washout.families import FAMILIES
-    from ..envs.interrupt import Interrupt
+    from ..envs.progress import Interrupt
 
     FAMILIES[command.algorithm]  # refuses an unknown one
     command = replace(command, out=_out(command))

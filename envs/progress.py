@@ -1,14 +1,15 @@
-"""Progress of long work on the error stream, so that results can be piped: bars on a terminal, else lines."""
+"""Progress of long work on the error stream, so that results can be piped, and Ctrl-C between its steps."""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Final
+from typing import Any, Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -168,3 +169,27 @@ def watch_cache(over: threading.Event) -> None:
         if folder and os.path.isdir(folder) and any(mark in name for name in os.listdir(folder)):
             print(COMPILING, file=sys.stderr, flush=True)
             return
+
+
+class Interrupt:
+    """Whether Ctrl-C was pressed; the second time it interrupts at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Hold SIGINT back within the block; only the main thread can."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        earlier = signal.signal(signal.SIGINT, self._ask)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, earlier)
+
+    def _ask(self, number: int, frame: Any) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True

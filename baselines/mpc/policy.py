@@ -24,8 +24,7 @@ from ..policy import Array, Information, Policy, checked_episode_start, checked_
 from ..symbolic import SymbolicMachine, cs
 from .parameters import MpcParameters
 from .prediction import REST, Floats, Forecaster
-from .problem import moving_axes
-from .solver import Plan, Planner, Rows
+from .solver import Plan, Planner, Rows, moving_axes
 
 try:
     from threadpoolctl import ThreadpoolController

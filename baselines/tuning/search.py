@@ -22,8 +22,7 @@ from ...envs.settings import Positive, configuration, from_dict, renamed, to_dic
 from ...envs.storage import write_text
 from ..washout.families import AnyWashout, family_of
 from .methods import CmaEs, GradientDescent, Method, StepResult
-from .objective import LIMIT_SLOPE, LIMIT_STEP, Measure, Objective
-from .space import WashoutSpace
+from .objective import LIMIT_SLOPE, LIMIT_STEP, Measure, Objective, WashoutSpace
 
 TRAIN: Final = "train"
 """Name of the random drives; the standard maneuvers are for evaluation."""

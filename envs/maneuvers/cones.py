@@ -27,7 +27,7 @@ from ..car.vehicles import Car
 from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .maneuver import KMH, Maneuver
+from .standard import KMH, Maneuver
 
 Floats = NDArray[np.float64]
 

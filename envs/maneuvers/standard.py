@@ -1,22 +1,83 @@
-"""Standard maneuvers: the paper's three, open-loop steering tests, and everyday traffic."""
+"""Maneuvers: their base class, and the standard ones: the paper's, steering tests and everyday traffic."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from abc import ABC, abstractmethod
 from dataclasses import field
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..car.kernels.driver import Driver
 from ..car.plans import DT, STEP, Change, Hold, Path, Schedule, bend, clothoids, smooth_steps
-from ..car.simulation import Plan, straight
-from ..car.vehicles import Car
-from ..cues import GRAVITY
+from ..car.simulation import Plan, simulate, straight
+from ..car.vehicles import SEDAN, Car
+from ..cues import GRAVITY, CueTrace
+from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .maneuver import DEGREE, KMH, Maneuver
 from .roads import Style, along_path, speed_limit
+
+KMH: Final = 1.0 / 3.6
+"""One km/h in m/s."""
+
+DEGREE: Final = math.pi / 180.0
+"""One degree in radians."""
+
+LARGEST_OFFSET: Final = 1.0
+"""How far from its path a driver who follows one may be, m; the package's own maneuvers stay within 0.4 m."""
+
+
+@configuration
+class Maneuver(ABC):
+    """A drive of a car, from calm to calm.
+
+    Args:
+        settle: Steady straight driving (or standing) before it, s.
+        calm: The same after it, s.
+    """
+
+    name: ClassVar[str]
+    """What it is called on the command line."""
+
+    settle: Positive = 2.0
+    calm: Positive = 3.0
+
+    @abstractmethod
+    def plan(self, car: Car) -> Plan:
+        """Path, speed and, for open-loop tests, steering for this car."""
+
+    def drive(self, car: Car | None = None) -> CueTrace:
+        """Let a car (the sedan if None) drive it; 100 Hz, at the origin of F_A.
+
+        Raises:
+            ConfigurationError: the car cannot drive it: it came off its path by more than
+                :data:`LARGEST_OFFSET`. Open-loop steering tests have no path to come off.
+            DataError: the car left the range of the vehicle model.
+        """
+        plan = self.plan(car or SEDAN)
+        trace = simulate([plan])[0]
+        if plan.steering is None:
+            self._refuse_if_off_path(trace, plan.car)
+        return trace
+
+    def _refuse_if_off_path(self, trace: CueTrace, car: Car) -> None:
+        offset = float(np.abs(trace.channels["path_offset_m"]).max())
+        if offset > LARGEST_OFFSET:
+            raise ConfigurationError(
+                f"{car.name} cannot drive {self.name} with {self._asked()}: "
+                f"it came {offset:.1f} m off its path (at most {LARGEST_OFFSET:g} m); "
+                "ask for less speed or gentler bends"
+            )
+
+    def _asked(self) -> str:
+        """The parameters that are plain numbers, as given."""
+        values = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        return ", ".join(
+            f"{name} {value:g}" for name, value in values.items() if isinstance(value, int | float)
+        )
 
 
 def _late_driver() -> Driver:

@@ -13,7 +13,7 @@ from ..platform.machines import Platform
 from ..simulator.kernels.step import CueCost
 from . import theme
 from .drawing import DESIGN_HEIGHT, Canvas, Floats
-from .motion_view import MotionView, leg_use
+from .machine_model import MotionView, leg_use
 
 WINDOW: Final = 8.0
 """Seconds a chart shows."""

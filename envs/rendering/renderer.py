@@ -16,14 +16,16 @@ from ..platform.machines import Platform
 from . import theme
 from .drawing import SUPERSAMPLING, Camera, Canvas, Mesh, Painter, load_pygame, orbit
 from .instruments import PANEL_WIDTH, CueHistory, draw_panel
-from .machine_model import Legs, MachineParts, machine_parts
-from .motion_view import (
+from .machine_model import (
     Frame,
+    Legs,
+    MachineParts,
     MotionView,
     carriage_frame,
     head,
     joints,
     leg_use,
+    machine_parts,
     neutral_view,
     platform_frame,
     turntable_frame,

@@ -12,7 +12,7 @@ from ...envs.arrays import FLOAT
 from ...envs.platform import Platform, actuator_limits
 from ...envs.platform.kernels.step import LEGS
 from ...envs.platform.kinematics import leg_motion
-from ...envs.platform.limits import limits_exceeded
+from ...envs.platform.machines import limits_exceeded
 from ...envs.simulator.simulator import Simulator
 from ..metrics import Criteria, cue_error
 from ..rollout import Rollout

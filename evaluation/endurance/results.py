@@ -25,7 +25,7 @@ from ...envs.settings import NonNegative, Positive, configuration, from_dict, to
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.storage import write_text
 from ...envs.task import RandomizationOptions, TaskOptions
-from ...envs.task.drives import machines_of
+from ...envs.task.episode import machines_of
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
 from ..results import save_rows
 from ..saved import Headed

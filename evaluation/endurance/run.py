@@ -21,7 +21,7 @@ from ...envs.cues import CueTrace
 from ...envs.errors import DataError
 from ...envs.platform import Platform
 from ...envs.simulator.simulator import TIME_STEP
-from ...envs.task.drives import slippery
+from ...envs.task.episode import slippery
 from ..policies import make_policy
 from ..rollout import Rollout
 from ..studies.store import identity

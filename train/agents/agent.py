@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from ...baselines.policy import TaskPolicy
 from ...baselines.washout import ClassicalWashout, WashoutParameters, load_washout
-from ...baselines.washout.classical.scheduled import KNOBS
+from ...baselines.washout.classical.policies import KNOBS
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
 from ...envs.platform.kernels.step import AXES
 from ...envs.platform.machines import Platform
-from ...envs.task.observation import Layout, layout_of
+from ...envs.task.kernels.observation import Layout, layout_of
 from ...envs.task.options import TaskOptions
 from . import names
 from .base_policy import base_policy as make_base

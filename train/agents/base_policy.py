@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from ...baselines.washout import ClassicalWashout, ScheduledWashout, WashoutParameters, load_washout
 from ...envs.errors import ConfigurationError
-from ...envs.task.drives import platform_of
+from ...envs.task.episode import platform_of
 from ...envs.task.options import TaskOptions
 
 DEFAULT: Final = "classical"

@@ -1,4 +1,4 @@
-"""The simulator's step: state of an environment, cue cost, motion base, cues and perception.
+"""The simulator's step and its adjoint: state, cue cost, motion base, cues and perception.
 
 car cue -> policy -> **motion base -> simulator cues -> perceived cues**
 """
@@ -291,3 +291,13 @@ step_forward = wp.kernel(step_kernel, enable_backward=False, module="unique")
 
 reset_forward = wp.kernel(reset_kernel, enable_backward=False, module="unique")
 """The reset."""
+
+step_with_adjoint = wp.kernel(step_kernel, enable_backward=True, module="unique")
+"""The step with its adjoint, for gradients by Warp's tape: compiled when first used, for about a minute."""
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def add_cue_error(z: Zone, state: wp.array(dtype=State), share: real, cost: wp.array(dtype=real)) -> None:
+    """Add a share of the cost of this moment, for every environment."""
+    i = wp.tid()
+    wp.atomic_add(cost, i, share * cue_error(z, state[i]))

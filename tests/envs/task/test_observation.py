@@ -13,7 +13,7 @@ from motion_cueing.baselines.washout import ClassicalWashout
 from motion_cueing.envs.simulator.kernels.observation import ROWS, SLICES
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomizationOptions
 from motion_cueing.envs.task.kernels import observation as layout_page
-from motion_cueing.envs.task.observation import observation_table
+from motion_cueing.envs.task.kernels.observation import observation_table
 
 from .tasks import drive
 
@@ -282,7 +282,7 @@ sys.meta_path.insert(0, Changed())
 import numpy as np
 from motion_cueing.envs.task import DrivingSimulator
 from motion_cueing.envs.task.kernels import observation as layout_page
-from motion_cueing.envs.task.observation import observation_table
+from motion_cueing.envs.task.kernels.observation import observation_table
 
 env = DrivingSimulator(episode={"library": 1, "drive_duration": 2.0})
 plain, _ = env.reset(seed=0)

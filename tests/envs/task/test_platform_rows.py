@@ -16,7 +16,8 @@ from motion_cueing.envs.task import (
     TaskOptions,
 )
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.observation import MACHINE, acceleration_scale, velocity_scale
+from motion_cueing.envs.task.kernels.action import acceleration_scale, velocity_scale
+from motion_cueing.envs.task.kernels.observation import MACHINE
 from motion_cueing.envs.task.unroll import TaskUnroll
 
 from .tasks import drive
