@@ -10,7 +10,7 @@ from scipy.signal import welch
 from ..envs.cues import GRAVITY, Floats
 from ..envs.logs.importer import ImportedLog
 from ..envs.logs.mounting import SMOOTHING_HZ, correlation
-from ..envs.logs.timing import low_pass
+from ..envs.logs.signals import low_pass
 from ..evaluation.reporting.figures import new_figure, png, styled
 
 _WINDOW_S = 20.0

@@ -9,7 +9,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from ..envs.errors import ConfigurationError
-from ..envs.logs.columns import ImportOptions, parse_columns
+from ..envs.logs.signals import ImportOptions, parse_columns
 from ..envs.storage import check_file, write_bytes
 from .arguments import Whole, option, several
 

@@ -51,6 +51,19 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         file.write(data)
 
 
+def cache_folder() -> Path:
+    """Folder for results that take long to compute; it may be deleted at any time.
+
+    It is ``MOTION_CUEING_CACHE`` of the environment, else ``motion-cueing`` in ``XDG_CACHE_HOME`` or in
+    ``~/.cache``.
+    """
+    chosen = os.environ.get("MOTION_CUEING_CACHE")
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "motion-cueing"
+
+
 # What a user names: files, and where a command writes, checked before the work.
 
 

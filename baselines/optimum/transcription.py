@@ -10,8 +10,6 @@ Gauss and Newton, which keeps every step a descent; that of the limits is exact.
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...envs.progress import Interrupt
 from ...envs.simulator.simulator import N_AXES
 from ..symbolic import Expression, cs
 from .program import Interval, NodeLimits, OptimumOptions, effort
@@ -36,15 +35,14 @@ class SolveMonitor:
 
     def __init__(self, on_iteration: OnIteration | None = None) -> None:
         self._on_iteration = on_iteration
-        self._iterations = 0
-        self._interrupted = False
+        self._iterations, self._interrupt = 0, Interrupt()
 
     def count(self) -> bool:
         """Count an iteration; returns whether to stop."""
         self._iterations += 1
         if self._on_iteration is not None:
             self._on_iteration(self._iterations)
-        return self._interrupted
+        return self._interrupt.asked
 
     @contextmanager
     def solving(self) -> Iterator[None]:
@@ -55,20 +53,11 @@ class SolveMonitor:
         Raises:
             KeyboardInterrupt: at the end of the solve, if Ctrl-C was pressed in it.
         """
-        self._iterations, self._interrupted = 0, False
-        if threading.current_thread() is not threading.main_thread():
+        self._iterations, self._interrupt = 0, Interrupt()
+        with self._interrupt.caught():
             yield
-            return
-        before = signal.signal(signal.SIGINT, lambda number, frame: self._interrupt())
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, before)
-        if self._interrupted:
+        if self._interrupt.asked:
             raise KeyboardInterrupt
-
-    def _interrupt(self) -> None:
-        self._interrupted = True
 
 
 def iteration_callback(

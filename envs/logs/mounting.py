@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ..cues import Floats
 from ..errors import DataError
-from .columns import ImportOptions, Sign
-from .timing import low_pass
+from .signals import ImportOptions, Sign, low_pass
 
 
 @dataclass(frozen=True)

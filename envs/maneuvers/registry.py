@@ -6,7 +6,7 @@ command that converted it from the published log.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -37,37 +37,14 @@ for _name, _where, _about in (
     _MANEUVERS.register(_name, f"{__package__}.{_where}", _about)
 
 
-def register(
-    name: str,
-    maneuver: Maneuver | Callable[[], Maneuver] | str,
-    description: str = "",
-    *,
-    replace: bool = False,
-) -> None:
-    """Give a maneuver a name, which every command and configuration then knows.
+register = _MANEUVERS.register
+"""Give a maneuver or its class a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
-    An installed package can do the same by an entry point of the group ``motion_cueing.maneuvers``.
+maneuver_names = _MANEUVERS.names
+"""Names that :func:`get_maneuver` knows, the paper's three first."""
 
-    Args:
-        name: What it is called.
-        maneuver: A :class:`~.standard.Maneuver`, its class, or ``"module:attribute"`` where either is.
-        description: One line for lists.
-        replace: Whether a name that is taken is given to the new one.
-
-    Raises:
-        ConfigurationError: the name is not one word, or is taken.
-    """
-    _MANEUVERS.register(name, maneuver, description, replace=replace)
-
-
-def maneuver_names() -> list[str]:
-    """Names that :func:`get_maneuver` knows, the paper's three first."""
-    return _MANEUVERS.names()
-
-
-def describe_maneuver(name: str) -> str:
-    """One line about a maneuver."""
-    return _MANEUVERS.description(name)
+describe_maneuver = _MANEUVERS.description
+"""One line about a maneuver."""
 
 
 def get_maneuver(name: str) -> Maneuver:
@@ -76,9 +53,8 @@ def get_maneuver(name: str) -> Maneuver:
     Raises:
         UnknownNameError: no such maneuver; the message lists the nearest names.
     """
-    item = _MANEUVERS[name]
-    found: Maneuver = item() if callable(item) else item
-    return found
+    maneuver: Maneuver = _MANEUVERS.make(name)
+    return maneuver
 
 
 _FOLDER: Final = Path(__file__).parent / "recorded"

@@ -141,6 +141,7 @@ class RoadKind:
 
 
 KMH: Final = 1.0 / 3.6
+"""One km/h in m/s."""
 
 ROLLING: Final[tuple[Range, Range]] = ((300.0, 600.0), (700.0, 1500.0))
 """Waves of an ordinary road's slope, m."""

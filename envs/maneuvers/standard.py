@@ -9,7 +9,6 @@ from dataclasses import field
 from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..car.kernels.driver import Driver
 from ..car.plans import DT, STEP, Change, Hold, Path, Schedule, bend, clothoids, smooth_steps
@@ -18,10 +17,7 @@ from ..car.vehicles import SEDAN, Car
 from ..cues import GRAVITY, CueTrace
 from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .roads import Style, along_path, speed_limit
-
-KMH: Final = 1.0 / 3.6
-"""One km/h in m/s."""
+from .roads import KMH, Floats, Style, along_path, speed_limit
 
 DEGREE: Final = math.pi / 180.0
 """One degree in radians."""
@@ -59,25 +55,24 @@ class Maneuver(ABC):
         """
         plan = self.plan(car or SEDAN)
         trace = simulate([plan])[0]
-        if plan.steering is None:
-            self._refuse_if_off_path(trace, plan.car)
-        return trace
-
-    def _refuse_if_off_path(self, trace: CueTrace, car: Car) -> None:
-        offset = float(np.abs(trace.channels["path_offset_m"]).max())
-        if offset > LARGEST_OFFSET:
+        offset = off_path(plan, trace)
+        if offset:
+            values = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+            numbers = [
+                f"{name} {value:g}" for name, value in values.items() if isinstance(value, int | float)
+            ]
             raise ConfigurationError(
-                f"{car.name} cannot drive {self.name} with {self._asked()}: "
+                f"{plan.car.name} cannot drive {self.name} with {', '.join(numbers)}: "
                 f"it came {offset:.1f} m off its path (at most {LARGEST_OFFSET:g} m); "
                 "ask for less speed or gentler bends"
             )
+        return trace
 
-    def _asked(self) -> str:
-        """The parameters that are plain numbers, as given."""
-        values = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-        return ", ".join(
-            f"{name} {value:g}" for name, value in values.items() if isinstance(value, int | float)
-        )
+
+def off_path(plan: Plan, trace: CueTrace) -> float:
+    """Largest distance from the path, m; 0 within :data:`LARGEST_OFFSET`, and in open-loop steering tests."""
+    offset = float(np.abs(trace.channels["path_offset_m"]).max())
+    return offset if plan.steering is None and offset > LARGEST_OFFSET else 0.0
 
 
 def _late_driver() -> Driver:
@@ -179,14 +174,11 @@ class LaneChange(Maneuver):
 # Open-loop steering tests: a robot turns the wheel, the driver only keeps the speed.
 
 
-Floats = NDArray[np.float64]
-
-
 @configuration
 class StepSteer(Maneuver):
     """ISO 7401: the wheel is turned to the right at a constant rate, held, and turned back.
 
-    The angle is that of a steady turn with the wanted acceleration in the linear range, i (L / R + K a_y).
+    The angle is that of a steady turn with this acceleration in the linear range, i (L / R + K a_y).
     The standard ends with the hold; turning back is added, so that the drive ends in calm.
 
     Args:

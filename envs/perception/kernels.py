@@ -101,7 +101,7 @@ def advance_vestibular(v: Vestibular, x: VestibularState, force: vec3, rate: vec
 
 @wp.func
 def rested(v: Vestibular, force: vec3, rate: vec3) -> VestibularState:
-    """The state in which these constant signals have been felt for ever."""
+    """The state after constant signals that have lasted for ever."""
     x = VestibularState()
     x.otoliths = wp.matrix_from_rows(
         v.otolith.rest * force[0], v.otolith.rest * force[1], v.otolith.rest * force[2]

@@ -120,7 +120,7 @@ class CueHistory:
 # A chart of the last seconds of one cue: reference in white, simulated in color, the gap between them shaded.
 
 
-_LADDER: Final = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0)
+_RANGES: Final = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0)
 """Ranges an axis may have, in its own unit."""
 _HEADROOM: Final = 1.05
 _MOST_POINTS: Final = 160
@@ -167,7 +167,7 @@ class Box:
 def axis_range(channel: Channel, peak: float) -> float:
     """Range of the axis that holds a peak, in SI; it only grows as a drive goes on."""
     needed = max(channel.least_range, _HEADROOM * peak * channel.scale)
-    return next((step for step in _LADDER if step >= needed), needed)
+    return next((step for step in _RANGES if step >= needed), needed)
 
 
 def draw_chart(canvas: Canvas, place: Box, channel: Channel, cues: CueHistory) -> None:

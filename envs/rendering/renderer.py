@@ -187,7 +187,7 @@ def placed(mesh: Mesh, frame: Frame) -> Mesh:
     return replace(mesh, vertices=frame(mesh.vertices))
 
 
-# Pictures of a machine in motion, beside the cues its driver should feel and does feel.
+# Pictures of a machine in motion, beside the reference and the simulator cues.
 
 
 FRAMES_PER_SECOND: Final = 30
@@ -226,7 +226,8 @@ class Renderer:
         self._backdrop = _backdrop(self._pygame, self._stage.get_size())
         self._window: Any = None
         self._clock: Any = None
-        self._closed_by_user = False
+        self.closed_by_user = False
+        """Whether the user has closed the window; no other one is opened."""
 
     def frame(self, motion: MotionView, cues: CueHistory) -> Picture:
         """A frame, (height, width, 3); the same input always gives the same pixels.
@@ -248,7 +249,7 @@ class Renderer:
 
         Once the user has closed the window, frames are dropped.
         """
-        if self._closed_by_user:
+        if self.closed_by_user:
             return
         pygame: Any = self._pygame
         if self._window is None:
@@ -261,12 +262,7 @@ class Renderer:
         self._clock.tick(rate)
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
-            self._closed_by_user = True
-
-    @property
-    def closed_by_user(self) -> bool:
-        """Whether the user has closed the window; no other one is opened."""
-        return self._closed_by_user
+            self.closed_by_user = True
 
     def close(self) -> None:
         """Close the window, if there is one; frames can still be drawn."""

@@ -79,7 +79,7 @@ class Base:
         """Episodes begin in the masked environments."""
         self._begins |= mask
 
-    def ask(
+    def act(
         self, observation: Array, out: Array, gains: Array | None, mask: NDArray[np.bool_] | None
     ) -> None:
         """Write what the policy does at observations (n, OBSERVATION_SIZE) into ``out`` (n, 9).
@@ -88,7 +88,7 @@ class Base:
             observation: The fixed rows.
             out: Accelerations, m/s^2 and rad/s^2.
             gains: (n, k) for a scheduled policy.
-            mask: (n,) the environments asked for, the others stay as they are; default: all.
+            mask: (n,) the environments it acts in, the others stay as they are; default: all.
         """
         begins = self._begins.copy()
         if self.scheduled:
@@ -120,17 +120,6 @@ class Base:
 NOTHING, CORE, FRAME, ALL = range(4)
 """Parts of an observation, as the kernels number them."""
 
-_KINDS: Final[dict[str, Any]] = {
-    "episode": Episode,
-    "begins": wp.bool,
-    "base": vec9,
-    "command": Command,
-    "terms": vec_terms,
-    "reward": real,
-    "terminated": wp.bool,
-    "truncated": wp.bool,
-}
-
 
 class BatchArrays:
     """The arrays of a batch, as attributes named like the fields of :class:`~.kernels.Arrays`.
@@ -143,20 +132,16 @@ class BatchArrays:
         device: Where kernels work on them.
     """
 
-    episode: Mirror
-    begins: Mirror
-    base: Mirror
-    command: Mirror
-    terms: Mirror
-    reward: Mirror
-    terminated: Mirror
-    truncated: Mirror
-
     def __init__(
         self, n: int, action_size: int, layout: Layout, memory: NDArray[np.float32], device: Any
     ) -> None:
-        for name, kind in _KINDS.items():
-            setattr(self, name, Mirror(n, kind, device))
+        self.episode = Mirror(n, Episode, device)
+        self.begins = Mirror(n, wp.bool, device)
+        self.base = Mirror(n, vec9, device)
+        self.command = Mirror(n, Command, device)
+        self.terms = Mirror(n, vec_terms, device)
+        self.reward = Mirror(n, real, device)
+        self.terminated, self.truncated = Mirror(n, wp.bool, device), Mirror(n, wp.bool, device)
         self.action = Mirror((n, action_size), wp.float32, device)
         self.now = Mirror((n, action_size), wp.float32, device)
         self.before = Mirror((n, action_size), wp.float32, device)
@@ -380,10 +365,10 @@ class Batch:
         within = CORE if base.residual or base.scheduled else NOTHING
         for k in range(repeat):
             if base.scheduled:
-                self._ask(gains)
+                self._act(gains)
             self._launches.play(k == 0, within if k < repeat - 1 or base.residual else ALL)
             if base.residual:
-                self._ask()
+                self._act()
             yield k
         if base.residual:
             self._launches.look(False, FRAME)
@@ -393,13 +378,13 @@ class Batch:
         self._mark(begins)
         self._launches.look(True, CORE)
         if self.base.residual:
-            self._ask(mask=begins)
+            self._act(mask=begins)
         self._launches.look(True, FRAME)
         self._mark(np.zeros(self.n, dtype=bool))
 
-    def _ask(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
+    def _act(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
         """Let the base policy act."""
-        self.base.ask(self.arrays.core.pull(), self.arrays.base.view, gains, mask)
+        self.base.act(self.arrays.core.pull(), self.arrays.base.view, gains, mask)
         self.arrays.base.push()
 
     def snapshot(self) -> Snapshot:

@@ -19,7 +19,7 @@ from ..car.simulation import Plan, simulate
 from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..maneuvers import drive_seeds, get_maneuver, get_recording, recording_names
-from ..maneuvers.standard import LARGEST_OFFSET
+from ..maneuvers.standard import LARGEST_OFFSET, off_path
 from ..platform.machines import UNLIMITED, ActuatorDynamics, Platform
 from ..platform.presets import get_platform
 from ..platform.randomization import random_platform
@@ -159,9 +159,7 @@ def _random_drives(episode: EpisodeOptions, randomization: RandomizationOptions)
         plans = [_slippery_plan(episode, seeds[draw * count + row], frictions[row]) for row in rows]
         traces = simulate(plans)
         drives.update(zip(rows, traces, strict=True))
-        off = [
-            k for k, (plan, trace) in enumerate(zip(plans, traces, strict=True)) if _comes_off(plan, trace)
-        ]
+        off = [k for k, (plan, trace) in enumerate(zip(plans, traces, strict=True)) if off_path(plan, trace)]
         if not off:
             break
         if draw == _DRAWS - 1 or (draw == 0 and len(off) > max(1.0, _OFTEN * count)):
@@ -196,25 +194,16 @@ def _driven(plans: list[Plan]) -> list[CueTrace]:
     """
     traces = simulate(plans)
     for plan, trace in zip(plans, traces, strict=True):
-        if _comes_off(plan, trace):
+        if off_path(plan, trace):
             raise _off_its_path(plan, trace)
     return traces
-
-
-def _offset(trace: CueTrace) -> float:
-    """Largest distance from the path, m."""
-    return float(np.abs(trace.channels["path_offset_m"]).max())
-
-
-def _comes_off(plan: Plan, trace: CueTrace) -> bool:
-    return plan.steering is None and _offset(trace) > LARGEST_OFFSET
 
 
 def _off_its_path(plan: Plan, trace: CueTrace) -> ConfigurationError:
     car = plan.car
     return ConfigurationError(
-        f"{car.name} with tire friction {car.tires.friction:.2f} came {_offset(trace):.1f} m off the path of "
-        f"{plan.name} (at most {LARGEST_OFFSET:g} m): raise randomization.friction, or leave the "
+        f"{car.name} with tire friction {car.tires.friction:.2f} came {off_path(plan, trace):.1f} m off the "
+        f"path of {plan.name} (at most {LARGEST_OFFSET:g} m): raise randomization.friction, or leave the "
         "drive or the car out of episode"
     )
 

@@ -13,11 +13,10 @@ import warp as wp
 from ....envs.cues import CueTrace
 from ....envs.errors import ActionError, ConfigurationError, DataError, UnknownNameError
 from ....envs.platform.machines import Cab, Platform
-from ....envs.settings import configuration
+from ....envs.settings import configuration, preset_names
 from ....envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ....envs.simulator.simulator import TIME_STEP
 from ...policy import WHOLE_DRIVE, Array, Policy, checked_observation
-from ...presets import preset_names
 from ..kernels.blocks import Parameters
 from .family import ClassicalWashout, WashoutParameters, kernel_parameters, load_washout
 

@@ -162,8 +162,6 @@ def most_drive(car: CarParameters, speed: real) -> real:
 # All cars of a batch, all time steps in one launch.
 
 
-wp.set_module_options({"enable_backward": False})
-
 SUBSTEPS = 5
 """Integration steps a sample: 2 ms, a sixth of the fastest time constant (the tires' at 40 m/s)."""
 

@@ -14,6 +14,8 @@ import warp as wp
 from ...arrays import mat33, real, vec2, vec3
 from ...cues import GRAVITY
 
+wp.set_module_options({"enable_backward": False})
+
 State: Any = wp.types.vector(15, real)
 """Integrated quantities of one car, by the indices below."""
 
@@ -92,8 +94,6 @@ class Forces:
 # Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill.
 
 
-wp.set_module_options({"enable_backward": False})
-
 _LEAST_CAPACITY = 0.05
 """Share of the friction that stays lateral when all of it is used longitudinally."""
 
@@ -157,8 +157,6 @@ def damped_slip(slip: real, along: real, across: real, low_speed: real, damping:
 
 # Equations of motion.
 
-
-wp.set_module_options({"enable_backward": False})
 
 AIR_DENSITY = 1.2
 """kg/m^3, at sea level and 20 degrees."""
@@ -343,9 +341,6 @@ def resist(car: CarParameters, deflection: real, state: State, command: Commands
 
 
 # Cues of the car: specific force and rotation at the cab, from the model's own derivatives.
-
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct

@@ -98,13 +98,13 @@ def error(z: Zone, force: vec3, reference_force: vec3, rate: vec3, reference_rat
 
 @wp.func
 def cue_error(z: Zone, s: State) -> real:
-    """The cost of what is felt at the cab's reference point."""
+    """Cost of the cue error at the cab's reference point."""
     return error(z, s.simulator_cue.force, s.reference_cue.force, s.simulator_cue.rate, s.reference_cue.rate)
 
 
 @wp.func
 def perceived_error(z: Zone, s: State) -> real:
-    """The cost of what the driver senses."""
+    """Cost of the error of the perceived cues."""
     return error(
         z,
         s.perceived_simulator.force,

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ...arrays import real, vec2, vec3, vec9
-from ...errors import UnknownNameError
 from ...platform.kernels.step import AXES, Motion
 from ...platform.kinematics import neutral_jacobian
 from ...platform.machines import Platform
-from ...settings import Positive, configuration
+from ...settings import Positive, check_names, configuration
 
 Floats = NDArray[np.float64]
 Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
@@ -53,9 +52,7 @@ class ActionOptions:
     frame: Frame = "machine"
 
     def __post_init__(self) -> None:
-        for axis in self.frozen:
-            if axis not in AXES:
-                raise ValueError(str(UnknownNameError("axis", axis, AXES)))
+        check_names("axis", self.frozen, AXES)
 
 
 def acceleration_scale(platform: Platform) -> Floats:
@@ -261,7 +258,7 @@ def own_accelerations(
 
 @wp.func
 def applied_accelerations(scale: ActionScale, m: Motion, own: vec9, base: vec9) -> vec9:
-    """What the axes are told: ``own`` accelerations in the machine's frame, with the base policy's."""
+    """Accelerations of the axes: the action's ``own`` in the machine's frame, with the base policy's."""
     if scale.mode == GAINS:
         return wp.cw_mul(base, scale.free)
     reference = own

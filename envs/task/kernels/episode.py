@@ -40,7 +40,7 @@ class Command:
     """What an environment's actions have asked for."""
 
     own: vec9  # the accelerations of the action itself, in its frame
-    asked: vec9  # what the axes are told, with the base policy's, in the machine's frame
+    asked: vec9  # with the base policy's, in the machine's frame
     clipped: int  # entries of the action outside [-1, 1]
 
 
@@ -118,22 +118,9 @@ def look_at(
         command = a.command[i]
         shift_frames(a.observation, i, rules.view.frame)
         write_frame(
-            rules.view,
-            drives,
-            drive,
-            a.episode[i],
-            which,
-            m,
-            s,
-            a.fixed,
-            a.now,
-            command.own,
-            a.base[i],
-            a.memory,
-            a.bounds,
-            a.observation,
-            i,
-        )
+            rules.view, drives, drive, a.episode[i], which, m, s, a.fixed,
+            a.now, command.own, a.base[i], a.memory, a.bounds, a.observation, i,
+        )  # fmt: skip
     return 0
 
 
@@ -233,10 +220,9 @@ def play_with_adjoint(
     s = state[i]
     asked = own_accelerations(rules.action, which, s.setpoint, now, i, own[i], rules.dt)
     own_out[i] = asked
-    wanted = wp.cw_mul(
-        applied_accelerations(rules.action, s.setpoint, asked, vec9()), episodes[i].actuator_gain
-    )
-    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, wanted, rules.dt)
+    applied = applied_accelerations(rules.action, s.setpoint, asked, vec9())
+    commanded = wp.cw_mul(applied, episodes[i].actuator_gain)
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, commanded, rules.dt)
     if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
@@ -266,19 +252,6 @@ def look_with_adjoint(
     """Observations before an action; ``now`` is the last one."""
     i = wp.tid()
     write_frame(
-        rules.view,
-        drives,
-        drive_of[i],
-        episodes[i],
-        machine_of[i],
-        machines[machine_of[i]],
-        state[i],
-        fixed,
-        now,
-        own[i],
-        vec9(),
-        memory,
-        bounds,
-        out,
-        i,
-    )
+        rules.view, drives, drive_of[i], episodes[i], machine_of[i], machines[machine_of[i]], state[i], fixed,
+        now, own[i], vec9(), memory, bounds, out, i,
+    )  # fmt: skip
