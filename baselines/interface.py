@@ -29,10 +29,6 @@ Floats = NDArray[np.float64]
 Array = NDArray[Any]
 
 
-def _zacharias() -> VestibularModel:
-    return get_vestibular_model("zacharias")
-
-
 @dataclass(frozen=True, eq=False)
 class Machines:
     """n drives, each on its machine.
@@ -48,7 +44,7 @@ class Machines:
     drives: Sequence[CueTrace]
     platforms: Sequence[Platform]
     platform_of: ArrayLike | None = None
-    vestibular: VestibularModel = field(default_factory=_zacharias)
+    vestibular: VestibularModel = field(default_factory=lambda: get_vestibular_model("zacharias"))
     time_step: float = TIME_STEP
 
 
@@ -100,11 +96,7 @@ class Interface(ABC):
 
     @abstractmethod
     def begin(self, start: ArrayLike | None) -> None:
-        """Begin all drives.
-
-        Args:
-            start: (9,) or (n, 9) pose to put the machines to rest at; None: from where they are.
-        """
+        """Begin all drives, at rest at (9,) or (n, 9) start poses; None: from where the machines are."""
 
     @abstractmethod
     def observe(self) -> Array:

@@ -271,11 +271,7 @@ def _motion_terms(grid: Grid, w: AxisWeights) -> Floats:
     end = np.zeros_like(along)
     end[-1, -1] = 1.0 / grid.times[-1]
     return np.array(
-        [
-            w.position * along + w.end_position * end,
-            w.rate * along + w.end_rate * end,
-            w.acceleration * along,
-        ]
+        [w.position * along + w.end_position * end, w.rate * along + w.end_rate * end, w.acceleration * along]
     )
 
 
@@ -362,12 +358,7 @@ def solve(
 
 
 def _solve_dual(
-    program: HorizonProgram,
-    about: Linearization,
-    bounds: Bounds,
-    factor: Floats,
-    free: Floats,
-    working: Rows,
+    program: HorizonProgram, about: Linearization, bounds: Bounds, factor: Floats, free: Floats, working: Rows
 ) -> tuple[Floats, Floats] | None:
     """Unknowns and multipliers under the working rows; None where the solver gives up.
 

@@ -18,7 +18,15 @@ from ...envs.platform import Platform, get_platform
 from ...envs.progress import progress
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE, read
 from ...envs.simulator.simulator import N_AXES
-from ..policy import WHOLE_DRIVE, Policy, checked_episode_start, checked_observation, wrong_state
+from ..policy import (
+    WHOLE_DRIVE,
+    Array,
+    Policy,
+    Starts,
+    checked_episode_start,
+    checked_observation,
+    wrong_state,
+)
 from .plan import Plan, key_of, load_plan, store_plan
 from .program import OptimumOptions
 from .windows import OnWindow, Planner
@@ -29,11 +37,7 @@ _PATIENCE: Final = 2.0
 
 @contextmanager
 def solve_progress(label: str, enabled: bool = True) -> Iterator[OnWindow | None]:
-    """A bar over the windows of a drive, on a terminal, once the solve takes long.
-
-    Args:
-        label: Name of the solve.
-        enabled: Whether to show it at all: a command that has a bar of its own does without.
+    """A bar over the windows of a drive, on a terminal, once the solve takes long and if it is ``enabled``.
 
     Yields:
         To be called with the share that is done and the iterations; None where nothing is shown.
@@ -86,10 +90,7 @@ class Optimum(Policy):
         self._cached, self._progress = cached, progress
 
     def for_drive(self, cues: CueTrace) -> PlannedDrive:
-        """The policy for one drive: solved here, or loaded from disk.
-
-        Args:
-            cues: The drive, at the time step of the rollout.
+        """The policy for one drive, at the time step of the rollout: solved here, or loaded from disk.
 
         Raises:
             ConfigurationError: the cues are no CueTrace.
@@ -144,19 +145,11 @@ class PlannedDrive(Policy):
         return self.plan.report.notes()
 
     def predict(
-        self,
-        observation: NDArray[Any],
-        state: Any = None,
-        episode_start: NDArray[Any] | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[NDArray[np.float64], Any]:
-        """The next accelerations of the plan; none after its end.
+        """The next accelerations of the plan; none after its end. The state is the number of steps done.
 
-        Args:
-            observation: (1, OBSERVATION_SIZE) or (OBSERVATION_SIZE,); only the first one matters.
-            state: The number of steps done; None at first.
-            episode_start: (1,) whether the drive begins anew.
-            deterministic: No effect.
+        Of the observations of one machine only the first matters.
 
         Raises:
             DataError: an argument has the wrong type or shape, or the observation is not finite.

@@ -27,11 +27,7 @@ OnIteration = Callable[[int], None]
 
 
 class SolveMonitor:
-    """Counts the iterations of a solve, and ends it after the iteration at hand on Ctrl-C.
-
-    Args:
-        on_iteration: Called with the number of iterations done.
-    """
+    """Counts the iterations of a solve, for ``on_iteration``, and ends it on Ctrl-C after the one at hand."""
 
     def __init__(self, on_iteration: OnIteration | None = None) -> None:
         self._on_iteration = on_iteration
@@ -207,13 +203,7 @@ class Transcription:
         monitor: Counts iterations.
     """
 
-    def __init__(
-        self,
-        blocks: Blocks,
-        intervals: int,
-        ipopt: dict[str, Any],
-        monitor: SolveMonitor,
-    ) -> None:
+    def __init__(self, blocks: Blocks, intervals: int, ipopt: dict[str, Any], monitor: SolveMonitor) -> None:
         self.blocks, self.intervals = blocks, intervals
         n = blocks.node_size
         self._x = cs.MX.sym("x", n * (intervals + 1))

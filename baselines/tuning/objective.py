@@ -162,10 +162,7 @@ class Objective:
         self.exempt = frozenset(exempt)
 
     def evaluate(
-        self,
-        sets: Sequence[AnyWashout],
-        drives: Sequence[int] | None = None,
-        guards: Sequence[int] = (),
+        self, sets: Sequence[AnyWashout], drives: Sequence[int] | None = None, guards: Sequence[int] = ()
     ) -> Evaluation:
         """Drive every set through drives, in one launch.
 

@@ -53,10 +53,7 @@ class WashoutBatch:
     """
 
     def __init__(
-        self,
-        sets: Sequence[FamilyParameters],
-        drives: Sequence[CueTrace],
-        platform: Platform,
+        self, sets: Sequence[FamilyParameters], drives: Sequence[CueTrace], platform: Platform
     ) -> None:
         if not sets or not drives:
             raise ConfigurationError("a washout batch needs at least one parameter set and one drive")

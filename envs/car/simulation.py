@@ -1,8 +1,8 @@
 """Simulation of plans: a batch of cars driven by the kernel, as cue traces, and what a rough road adds.
 
-**Road roughness.** Each of two wheel tracks is Gaussian with the spectrum of ISO 8608, G(n) = G(n0) (n / n0)^-2
-with n0 = 0.1 1/m. The body heaves, pitches and rolls on its springs by what is between the wheels; the motion is
-small, so that its cues are added to those of the smooth road.
+**Road roughness.** Each of two wheel tracks is Gaussian with the spectrum of ISO 8608, G(n) =
+G(n0) (n / n0)^-2 with n0 = 0.1 1/m. The body heaves, pitches and rolls on its springs by what is between the
+wheels; the motion is small, so that its cues are added to those of the smooth road.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Signals of a log: import options, columns and units, gaps, an even time grid, and a low-pass without delay."""
+"""Signals of a log: import options, columns and units, gaps, an even grid, and a low-pass without delay."""
 
 from __future__ import annotations
 

@@ -35,11 +35,7 @@ def load_pygame() -> ModuleType:
 
 
 def load(module: str, package: str) -> ModuleType:
-    """A module of the extra ``render``.
-
-    Args:
-        module: What is imported.
-        package: The distribution it comes from.
+    """A module of the extra ``render``, of a package.
 
     Raises:
         RenderingUnavailableError: it is not installed.

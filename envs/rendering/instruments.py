@@ -36,12 +36,7 @@ class CueHistory:
     """
 
     def __init__(
-        self,
-        maneuver: str,
-        policy: str,
-        dt: float,
-        window: float = WINDOW,
-        cost: CueCost | None = None,
+        self, maneuver: str, policy: str, dt: float, window: float = WINDOW, cost: CueCost | None = None
     ) -> None:
         if not (dt > 0.0 and window > dt):
             raise ConfigurationError(f"dt must be positive and below window, found {dt} and {window}")
@@ -244,13 +239,7 @@ def draw_gauges(canvas: Canvas, place: Box, platform: Platform, motion: MotionVi
 
 
 def _carriage(
-    canvas: Canvas,
-    x: float,
-    y: float,
-    square: float,
-    below: float,
-    platform: Platform,
-    motion: MotionView,
+    canvas: Canvas, x: float, y: float, square: float, below: float, platform: Platform, motion: MotionView
 ) -> None:
     """Travel in plan: ahead is up, right is right."""
     carriage = platform.carriage
@@ -276,13 +265,7 @@ def _carriage(
 
 
 def _turntable(
-    canvas: Canvas,
-    x: float,
-    y: float,
-    radius: float,
-    below: float,
-    platform: Platform,
-    motion: MotionView,
+    canvas: Canvas, x: float, y: float, radius: float, below: float, platform: Platform, motion: MotionView
 ) -> None:
     """The heading in plan: ahead is up, positive to the right."""
     turntable = platform.turntable
@@ -322,12 +305,7 @@ def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: 
     canvas.line((place.x, middle), (place.x + place.width, middle), theme.FAINT_TEXT, 0.8)
     most = motion.legs[int(np.argmax(np.abs(motion.legs)))]
     canvas.text(
-        place.x + 0.5 * place.width,
-        below,
-        f"{signed(most, 2)} m",
-        _LABEL,
-        theme.FAINT_TEXT,
-        "center",
+        place.x + 0.5 * place.width, below, f"{signed(most, 2)} m", _LABEL, theme.FAINT_TEXT, "center"
     )
 
 

@@ -317,12 +317,7 @@ def _cockpit(driver: Floats, deck: float) -> CabParts:
     occupant = joined(seat(driver, plate), driver_figure(driver))
     return CabParts(
         inside=(foot, floor),
-        furniture=(
-            column,
-            steering_wheel(driver),
-            occupant,
-            seat_back(driver),
-        ),
+        furniture=(column, steering_wheel(driver), occupant, seat_back(driver)),
         driver=driver,
         shell=None,
         wheels=((), ()),

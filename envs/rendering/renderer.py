@@ -134,9 +134,7 @@ class Scene:
         carriage = self._platform.carriage
         if carriage is not None:
             painter.lines(
-                *travel_lines(carriage.travel_x, carriage.travel_y, self._parts.floor),
-                theme.TRAVEL,
-                2 * unit,
+                *travel_lines(carriage.travel_x, carriage.travel_y, self._parts.floor), theme.TRAVEL, 2 * unit
             )
         self._soft_shadow(painter, motion)
         if self._parts.rails is not None and self._parts.bridge is not None:

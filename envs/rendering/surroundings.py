@@ -164,11 +164,7 @@ HEAD_RADIUS: Final = 0.115
 
 
 def driver_figure(head: NDArray[np.float64]) -> Mesh:
-    """A sitting driver in the cab's frame.
-
-    Args:
-        head: (3,) middle of the head, m.
-    """
+    """A sitting driver in the cab's frame, with the middle of the head at (3,), m."""
     neck, hips = head + np.array([-0.02, 0.0, 0.12]), head + np.array([-0.10, 0.0, 0.62])
     return joined(
         cylinder(hips, neck + np.array([-0.03, 0.0, 0.06]), 0.17, theme.SHIRT, sides=12),

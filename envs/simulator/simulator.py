@@ -192,10 +192,7 @@ class Simulator:
         return np.asarray(self.state["sample"] >= lengths - 1)
 
     def reset(
-        self,
-        start: ArrayLike | None = None,
-        sample: ArrayLike | None = None,
-        mask: ArrayLike | None = None,
+        self, start: ArrayLike | None = None, sample: ArrayLike | None = None, mask: ArrayLike | None = None
     ) -> NDArray[Any]:
         """Put environments at rest.
 

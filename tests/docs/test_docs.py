@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from motion_cueing.cli.main import COMMANDS, main
-from motion_cueing.evaluation.provenance import package_version
+from motion_cueing.envs.provenance import package_version
 
 from ..car import synthetic_log
 from ..repository import ROOT

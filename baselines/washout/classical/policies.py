@@ -126,11 +126,7 @@ _SETS: Final = Path(__file__).parent / "presets" / "per-maneuver"
 
 @configuration
 class PerManeuverParameters:
-    """Parameter sets by maneuver.
-
-    Args:
-        sets: Parameter set of each maneuver.
-    """
+    """Parameter sets by maneuver."""
 
     sets: dict[str, WashoutParameters]
 

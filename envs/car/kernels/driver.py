@@ -275,8 +275,7 @@ def target_at(schedule: wp.array(dtype=vec4), task: Task, sample: int, lead: int
 def pedals(car: CarParameters, force: real, speed: real) -> vec2:
     """Drive and brake force asked for, N, within what the car has."""
     return vec2(
-        wp.clamp(force, real(0.0), most_drive(car, speed)),
-        wp.clamp(-force, real(0.0), car.max_brake_force),
+        wp.clamp(force, real(0.0), most_drive(car, speed)), wp.clamp(-force, real(0.0), car.max_brake_force)
     )
 
 

@@ -109,13 +109,7 @@ def share_of_limit(value: real, lower: real, upper: real) -> real:
 
 @wp.func
 def write_observation(
-    m: Machine,
-    s: State,
-    p: Motion,
-    acceleration: vec9,
-    cues: Cues,
-    out: wp.array2d(dtype=real),
-    i: int,
+    m: Machine, s: State, p: Motion, acceleration: vec9, cues: Cues, out: wp.array2d(dtype=real), i: int
 ) -> int:
     """One environment's observation: each row at its place in :data:`ROWS`.
 

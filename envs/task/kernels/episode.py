@@ -101,15 +101,7 @@ def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> 
 
 @wp.func
 def look_at(
-    rules: Rules,
-    a: Arrays,
-    drives: Drives,
-    drive: int,
-    which: int,
-    m: Machine,
-    s: State,
-    i: int,
-    parts: int,
+    rules: Rules, a: Arrays, drives: Drives, drive: int, which: int, m: Machine, s: State, i: int, parts: int
 ) -> int:
     """Write the observation of an environment, or parts of it."""
     if parts & CORE:
