@@ -80,7 +80,7 @@ class Interface(ABC):
         simulator: With the machines.
         action_size: Entries of an action.
         steps_per_action: Time steps for which an action is held.
-        requested: (n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2.
+        requested: (n, 9) accelerations commanded to the axes in the last time step, m/s^2 and rad/s^2.
         slices: Where the rows of an observation are, by name.
         simulator_cue_measured: Whether its rows of simulator cues are sensors' readings, not a model's.
         cue_memory: Low-passed cues of each sample that observations hold, and their time constants, s.
@@ -119,7 +119,7 @@ class Interface(ABC):
 
 
 class MachineInterface(Interface):
-    """For policies that see the simulator's rows and ask for accelerations of the nine axes."""
+    """For policies that see the simulator's rows and answer with accelerations of the nine axes."""
 
     def __init__(self, machines: Machines) -> None:
         self.simulator = Simulator(
@@ -191,8 +191,8 @@ class TaskInterface(Interface):
 
     @property
     def requested(self) -> Floats:  # type: ignore[override]
-        """(n, 9) accelerations that the environment, its base policy included, asked for."""
-        return self.batch.asked
+        """(n, 9) accelerations commanded by the environment, its base policy included."""
+        return self.batch.commanded
 
     def begin(self, start: ArrayLike | None) -> None:
         """Begin an episode everywhere."""

@@ -153,12 +153,6 @@ def _no_motion(platform: Platform) -> Policy:
     return NoMotion()
 
 
-def _per_maneuver(platform: Platform) -> Policy:
-    from .washout.classical import PerManeuverWashout
-
-    return PerManeuverWashout(platform)
-
-
 def _washout(name: str, platform: Platform) -> Policy:
     from .washout import load_parameters, make_washout
 
@@ -199,7 +193,7 @@ def _register_own() -> None:
     register("no-motion", _no_motion, "the machine stands still")
     register(
         "classical-per-maneuver",
-        _per_maneuver,
+        f"{__package__}.washout.classical:PerManeuverWashout",
         "an oracle: classical with the best set for each standard maneuver",
     )
     for name, about in {

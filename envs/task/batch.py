@@ -415,9 +415,9 @@ class Batch:
         return [(name, mirror) for name, mirror in vars(self.arrays).items() if name not in _CONSTANT]
 
     @property
-    def asked(self) -> NDArray[np.float64]:
-        """(n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2."""
-        return np.array(self.arrays.command.pull()["asked"], dtype=np.float64)
+    def commanded(self) -> NDArray[np.float64]:
+        """(n, 9) accelerations commanded to the axes in the last time step, m/s^2 and rad/s^2."""
+        return np.array(self.arrays.command.pull()["commanded"], dtype=np.float64)
 
     @property
     def clipped(self) -> NDArray[np.int32]:

@@ -142,15 +142,15 @@ def force_command(
     """
     slope = real(GRAVITY) * wp.sin(grade)
     if target.speed <= real(0.0):
-        wanted = target.acceleration_now - driver.speed_gain * wp.max(speed, real(0.0))
-        return car.mass * (wp.min(wanted, real(0.0)) - wp.abs(slope))
+        needed = target.acceleration_now - driver.speed_gain * wp.max(speed, real(0.0))
+        return car.mass * (wp.min(needed, real(0.0)) - wp.abs(slope))
     follow = driver.position_gain * wp.min(real(0.5) * target.speed, real(1.0))
-    wanted = (
+    needed = (
         target.acceleration
         + driver.speed_gain * (target.speed - speed)
         + follow * (target.position - position)
     )
-    return car.mass * (wanted + slope + car.rolling_resistance * real(GRAVITY)) + air_drag(car, speed)
+    return car.mass * (needed + slope + car.rolling_resistance * real(GRAVITY)) + air_drag(car, speed)
 
 
 @wp.func
@@ -342,9 +342,9 @@ def decide(
     """What the driver asks for, held for one integration step."""
     command = Commands()
     force = force_command(car, driver, state[FORWARD], station, target, slope.grade)
-    asked = pedals(car, force, state[FORWARD])
-    command.drive = asked[0]
-    command.brake = asked[1]
+    forces = pedals(car, force, state[FORWARD])
+    command.drive = forces[0]
+    command.brake = forces[1]
     command.wheel_lag = driver.hand_lag
     command.wheel = wheel
     if task.open_loop == 0:

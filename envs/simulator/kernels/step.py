@@ -10,8 +10,8 @@ from typing import Any
 
 import warp as wp
 
-from ...arrays import real, vec3, vec9
-from ...perception.kernels import Sensed, Vestibular, VestibularState, advance_vestibular, rested, sense
+from ...arrays import bool_array, int_array, real, vec3, vec9
+from ...perception.kernels import Perceived, Vestibular, VestibularState, advance_vestibular, perceive, rested
 from ...platform.kernels.geometry import cab_angular_velocity, leg_extensions, specific_force
 from ...platform.kernels.step import Machine, Motion, SetPoint, actuate, command, mean_acceleration
 from ...settings import Positive, configuration
@@ -40,8 +40,8 @@ class State:
     simulator_cue: Cues
     vestibular_reference: VestibularState
     vestibular_simulator: VestibularState
-    perceived_reference: Sensed
-    perceived_simulator: Sensed
+    perceived_reference: Perceived
+    perceived_simulator: Perceived
 
 
 @wp.struct
@@ -51,8 +51,8 @@ class Drives:
     force: wp.array(dtype=vec3)
     rate: wp.array(dtype=vec3)
     rate_derivative: wp.array(dtype=vec3)
-    first: wp.array(dtype=int)  # of each drive
-    length: wp.array(dtype=int)
+    first: int_array  # of each drive
+    length: int_array
 
 
 # Cue cost: squared errors in units of the indifference zone.
@@ -172,10 +172,10 @@ def initial_state(m: Machine, v: Vestibular, drives: Drives, drive: int, sample:
     state.simulator_cue = simulator_cues(m, state.motion, vec9())
     state.vestibular_reference = rested(v, state.reference_cue.head_force, state.reference_cue.rate)
     state.vestibular_simulator = rested(v, state.simulator_cue.head_force, state.simulator_cue.rate)
-    state.perceived_reference = sense(
+    state.perceived_reference = perceive(
         v, state.vestibular_reference, state.reference_cue.head_force, state.reference_cue.rate
     )
-    state.perceived_simulator = sense(
+    state.perceived_simulator = perceive(
         v, state.vestibular_simulator, state.simulator_cue.head_force, state.simulator_cue.rate
     )
     return state
@@ -213,10 +213,10 @@ def next_state(
     after.vestibular_simulator = advance_vestibular(
         v, state.vestibular_simulator, state.simulator_cue.head_force, state.simulator_cue.rate
     )
-    after.perceived_reference = sense(
+    after.perceived_reference = perceive(
         v, after.vestibular_reference, after.reference_cue.head_force, after.reference_cue.rate
     )
-    after.perceived_simulator = sense(
+    after.perceived_simulator = perceive(
         v, after.vestibular_simulator, after.simulator_cue.head_force, after.simulator_cue.rate
     )
     return after
@@ -243,8 +243,8 @@ def step_kernel(
     machines: wp.array(dtype=Machine),
     vestibular: wp.array(dtype=Vestibular),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
     dt: real,
     state: wp.array(dtype=State),
     delay: wp.array2d(dtype=SetPoint),
@@ -265,11 +265,11 @@ def reset_kernel(
     machines: wp.array(dtype=Machine),
     vestibular: wp.array(dtype=Vestibular),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
-    sample: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
+    sample: int_array,
     start: wp.array(dtype=vec9),
-    mask: wp.array(dtype=wp.bool),
+    mask: bool_array,
     state_out: wp.array(dtype=State),
     delay_out: wp.array2d(dtype=SetPoint),
 ) -> None:
