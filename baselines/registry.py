@@ -144,9 +144,6 @@ def _import(module: str) -> Any:
     return loaded
 
 
-# The policies of this package. Factories import what they need.
-
-
 def _no_motion(platform: Platform) -> Policy:
     from .policy import NoMotion
 

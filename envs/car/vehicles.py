@@ -184,9 +184,6 @@ class Car:
         return self.steering.ratio * road_wheel * lateral_acceleration
 
 
-# The cars of the package, by name.
-
-
 SEDAN: Final = Car(
     name="sedan",
     description="1814 kg sedan, the car of the paper",

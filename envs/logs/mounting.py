@@ -70,9 +70,6 @@ def level(rest: ArrayLike) -> tuple[float, float]:
     return float(np.arctan2(-y, -z)), float(np.arctan2(x, np.hypot(y, z)))
 
 
-# Evidence: the smoothed signals that an estimate uses.
-
-
 SMOOTHING_HZ: Final = 0.5
 """Cut-off for everything that is estimated: below it, the car moves as a point with its speed and course."""
 
@@ -182,9 +179,6 @@ def correlation(a: Floats, b: Floats) -> float:
     a, b = a - a.mean(), b - b.mean()
     scale = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b) / scale if scale > 0.0 else 0.0
-
-
-# The estimate.
 
 
 CLEAR: Final = 0.3

@@ -85,9 +85,6 @@ class ImportOptions:
         return cutoff_hz
 
 
-# Columns: signal, unit and sign.
-
-
 FORCES: Final = ("force_x", "force_y", "force_z")
 """Specific force along the axes of the device."""
 

@@ -154,9 +154,6 @@ def clearance(trace: CueTrace, car: Car, gates: Sequence[Gate]) -> float:
     return least
 
 
-# The maneuvers.
-
-
 TEST_DRIVER = Driver(preview_time=0.7)
 """Aims nearer than in traffic."""
 

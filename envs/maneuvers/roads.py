@@ -97,9 +97,6 @@ def _smoothed(speed: Floats) -> Schedule:
     return Schedule(np.where(standing, 0.0, speed), np.where(standing, -HOLD, acceleration))
 
 
-# Random roads: stretches of curvature, speed limit and stops, put one after the other.
-
-
 Range = tuple[float, float]
 
 

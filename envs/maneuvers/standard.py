@@ -246,9 +246,6 @@ class SineWithDwell(Maneuver):
         return Plan(self.name, car, straight(), schedule, steering=steering)
 
 
-# Maneuvers of everyday traffic: pulling away, stop and go, a roundabout, a hill.
-
-
 @configuration
 class Acceleration(Maneuver):
     """Pulling away from rest to 80 km/h with 0.25 g, the counterpart of braking.

@@ -112,9 +112,6 @@ class CueHistory:
         return rows
 
 
-# A chart of the last seconds of one cue: reference in white, simulated in color, the gap between them shaded.
-
-
 _RANGES: Final = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0)
 """Ranges an axis may have, in its own unit."""
 _HEADROOM: Final = 1.05
@@ -215,9 +212,6 @@ def _every_nth(cues: CueHistory) -> np.ndarray:
     return np.unique(np.append(np.arange(first, count, step), count - 1))
 
 
-# Use of the travel: the carriage in plan, the heading of the turntable, six bars for the legs.
-
-
 _LABEL: Final = 11.0
 
 
@@ -312,9 +306,6 @@ def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: 
 def signed(value: float, digits: int) -> str:
     """A number with its sign; what rounds to zero never flickers between +0 and −0."""
     return f"{round(float(value), digits) + 0.0:+.{digits}f}".replace("-", "−")
-
-
-# The panel beside the machine: what is driven, J so far, the cues, and the use of the machine.
 
 
 PANEL_WIDTH: Final = 400.0

@@ -324,9 +324,6 @@ def _cockpit(driver: Floats, deck: float) -> CabParts:
     )
 
 
-# The six legs: a barrel below, colored by the use of the stroke, and a rod to the upper joint.
-
-
 _BARREL_SHARE: Final = 0.92
 """Of the barrel's length in that of the shortest leg."""
 _BARREL_RADIUS: Final = 0.095

@@ -54,9 +54,6 @@ def append_state(history: CueHistory, time: float, state: Any) -> None:
     history.append(time, reference, simulated)
 
 
-# The machine in its hall, in three dimensions.
-
-
 Floats = NDArray[np.float64]
 
 _AZIMUTH: Final = np.radians(-134.0)
@@ -183,9 +180,6 @@ class Scene:
 def placed(mesh: Mesh, frame: Frame) -> Mesh:
     """A body's mesh in F_I."""
     return replace(mesh, vertices=frame(mesh.vertices))
-
-
-# Pictures of a machine in motion, beside the reference and the simulator cues.
 
 
 FRAMES_PER_SECOND: Final = 30

@@ -156,9 +156,6 @@ def steering_wheel(driver: NDArray[np.float64]) -> Mesh:
     return rim.moved(driver + np.array([0.55, 0.0, 0.38]))
 
 
-# The driver, drawn around the point where the machine's parameters put the head.
-
-
 HEAD_RADIUS: Final = 0.115
 """m."""
 
@@ -194,9 +191,6 @@ def _arm(head: NDArray[np.float64], side: float) -> Mesh:
         cylinder(elbow, hand, 0.042, theme.SHIRT, sides=8),
         sphere(0.05, theme.SKIN, sides=8).moved(hand),
     )
-
-
-# The floor of the hall: a grid, the border of the carriage's travel, and the machine's shadow.
 
 
 Floats = NDArray[np.float64]

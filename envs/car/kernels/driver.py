@@ -159,9 +159,6 @@ def most_drive(car: CarParameters, speed: real) -> real:
     return wp.min(car.max_drive_force, car.max_power / wp.max(speed, real(1.0)))
 
 
-# All cars of a batch, all time steps in one launch.
-
-
 SUBSTEPS = 5
 """Integration steps a sample: 2 ms, a sixth of the fastest time constant (the tires' at 40 m/s)."""
 

@@ -91,9 +91,6 @@ class Forces:
     slip_rate_rear: real
 
 
-# Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill.
-
-
 _LEAST_CAPACITY = 0.05
 """Share of the friction that stays lateral when all of it is used longitudinally."""
 
@@ -153,9 +150,6 @@ def damped_slip(slip: real, along: real, across: real, low_speed: real, damping:
         weight = real(0.5) * (real(1.0) + wp.cos(real(math.pi) * speed / low_speed))
         result = slip - damping * weight * across
     return result
-
-
-# Equations of motion.
 
 
 AIR_DENSITY = 1.2
@@ -338,9 +332,6 @@ def resist(car: CarParameters, deflection: real, state: State, command: Commands
     after = limited(deflection + state[FORWARD] * dt, limit)
     force = stiffness * after + car.mass * car.standstill_damping * (after - deflection) / dt
     return vec2(after, limited(force, most))
-
-
-# Cues of the car: specific force and rotation at the cab, from the model's own derivatives.
 
 
 @wp.struct

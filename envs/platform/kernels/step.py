@@ -103,9 +103,6 @@ def active_limit(
     return 4
 
 
-# A machine (constant) and its motion (changing).
-
-
 CARRIAGE = slice(0, 2)
 LEGS = slice(2, 8)
 TURNTABLE = 8
@@ -164,9 +161,6 @@ class Step:
     limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
 
 
-# Lag and dead time.
-
-
 @wp.func
 def subsystem(actuator: int) -> int:
     """0 carriage, 1 hexapod, 2 turntable."""
@@ -199,9 +193,6 @@ def lag(
         + m.lag[row + 1, 4] * u_acceleration
     )
     return vec2(position, rate)
-
-
-# Singular poses: the platform does not come to rest near one, where its legs do not hold it.
 
 
 FAR_FROM_SINGULAR = wp.constant(real(0.75))
@@ -263,9 +254,6 @@ def keeps_clear(
         m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
     )
     return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
-
-
-# The step.
 
 
 @wp.struct

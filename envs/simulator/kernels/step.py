@@ -55,9 +55,6 @@ class Drives:
     length: int_array
 
 
-# Cue cost: squared errors in units of the indifference zone.
-
-
 @configuration
 class CueCost:
     """|df|^2 / force^2 + |dw|^2 / rate^2, whose mean over time is J.
@@ -112,9 +109,6 @@ def perceived_error(z: Zone, s: State) -> real:
         s.perceived_simulator.rate,
         s.perceived_reference.rate,
     )
-
-
-# The step. One definition serves every kernel.
 
 
 @wp.func

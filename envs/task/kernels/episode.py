@@ -181,9 +181,6 @@ def forget(a: Arrays) -> None:
     a.command[i] = Command()
 
 
-# With adjoints.
-
-
 @wp.kernel(enable_backward=True, module="unique")
 def play_with_adjoint(
     rules: Rules,

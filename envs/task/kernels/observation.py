@@ -271,9 +271,6 @@ def observation_table() -> str:
     return "\n".join(lines)
 
 
-# Memory: the car's cues through first-order low-passes.
-
-
 def low_passed(drives: Sequence[CueTrace], time_constants: Sequence[float], dt: float) -> NDArray[np.float32]:
     """(samples of all drives, 6 per time constant) cues through 1 / (T s + 1), scaled as the observation's.
 
@@ -292,9 +289,6 @@ def _of_drive(drive: CueTrace, time_constants: Sequence[float], dt: float) -> ND
         filtered, _ = lfilter([1.0 - p], [1.0, -p], cues, axis=0, zi=p * cues[:1])
         columns.append(filtered)
     return np.hstack(columns)
-
-
-# Abilities of a machine.
 
 
 _TURN: Final = 2.0 * np.pi
@@ -354,9 +348,6 @@ class Episode:
     force_gain: real  # of the cab's accelerometers
     rate_gain: real  # of its gyroscopes
     actuator_gain: vec9
-
-
-# The rows in a kernel.
 
 
 Firsts: Any = wp.struct(
