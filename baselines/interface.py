@@ -29,10 +29,6 @@ Floats = NDArray[np.float64]
 Array = NDArray[Any]
 
 
-def _zacharias() -> VestibularModel:
-    return get_vestibular_model("zacharias")
-
-
 @dataclass(frozen=True, eq=False)
 class Machines:
     """n drives, each on its machine.
@@ -48,7 +44,7 @@ class Machines:
     drives: Sequence[CueTrace]
     platforms: Sequence[Platform]
     platform_of: ArrayLike | None = None
-    vestibular: VestibularModel = field(default_factory=_zacharias)
+    vestibular: VestibularModel = field(default_factory=lambda: get_vestibular_model("zacharias"))
     time_step: float = TIME_STEP
 
 
@@ -84,7 +80,7 @@ class Interface(ABC):
         simulator: With the machines.
         action_size: Entries of an action.
         steps_per_action: Time steps for which an action is held.
-        requested: (n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2.
+        requested: (n, 9) accelerations commanded to the axes in the last time step, m/s^2 and rad/s^2.
         slices: Where the rows of an observation are, by name.
         simulator_cue_measured: Whether its rows of simulator cues are sensors' readings, not a model's.
         cue_memory: Low-passed cues of each sample that observations hold, and their time constants, s.
@@ -100,11 +96,7 @@ class Interface(ABC):
 
     @abstractmethod
     def begin(self, start: ArrayLike | None) -> None:
-        """Begin all drives.
-
-        Args:
-            start: (9,) or (n, 9) pose to put the machines to rest at; None: from where they are.
-        """
+        """Begin all drives, at rest at (9,) or (n, 9) start poses; None: from where the machines are."""
 
     @abstractmethod
     def observe(self) -> Array:
@@ -127,7 +119,7 @@ class Interface(ABC):
 
 
 class MachineInterface(Interface):
-    """For policies that see the simulator's rows and ask for accelerations of the nine axes."""
+    """For policies that see the simulator's rows and answer with accelerations of the nine axes."""
 
     def __init__(self, machines: Machines) -> None:
         self.simulator = Simulator(
@@ -199,8 +191,8 @@ class TaskInterface(Interface):
 
     @property
     def requested(self) -> Floats:  # type: ignore[override]
-        """(n, 9) accelerations that the environment, its base policy included, asked for."""
-        return self.batch.asked
+        """(n, 9) accelerations commanded by the environment, its base policy included."""
+        return self.batch.commanded
 
     def begin(self, start: ArrayLike | None) -> None:
         """Begin an episode everywhere."""

@@ -39,7 +39,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +50,13 @@ from ..envs.errors import ConfigurationError, DataError
 from ..envs.platform.machines import Platform
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ..envs.simulator.simulator import N_AXES, TIME_STEP
-from ..envs.task.drives import platform_of
+from ..envs.task.episode import platform_of
 from ..envs.task.options import TaskOptions
 from .interface import Interface, MachineInterface, Machines, TaskInterface
 
 Array = NDArray[Any]
+Starts: TypeAlias = "NDArray[Any] | None"
+"""(n,) whether each machine begins a drive; None in mid-drive."""
 
 
 @dataclass(frozen=True)
@@ -119,11 +121,7 @@ class Policy:
         return type(self).for_drive is not Policy.for_drive
 
     def for_drive(self, cues: CueTrace) -> Policy:
-        """The policy for one drive, whose first call sees the machine at the first sample.
-
-        Args:
-            cues: The drive, at the time step of the rollout.
-        """
+        """The policy for one drive, at the time step of the rollout; it begins at the first sample."""
         return self
 
     def for_platform(self, platform: Platform) -> Policy:
@@ -143,11 +141,7 @@ class Policy:
         return MachineInterface(machines)
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, Any]:
         """Actions for observations, in the convention of Stable-Baselines3.
 
@@ -174,11 +168,7 @@ class NoMotion(Policy):
     name = "no-motion"
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, Any]:
         """Nine zeros."""
         return np.zeros((*np.shape(observation)[:-1], N_AXES)), state
@@ -240,11 +230,7 @@ class TaskPolicy(Policy):
 
 
 class Wrapper(Policy):
-    """A policy that stands before another one, and is what that one is in all that it does not override.
-
-    Args:
-        policy: The other one.
-    """
+    """A policy that stands before another one, and is what that one is in all that it does not override."""
 
     def __init__(self, policy: Policy) -> None:
         self.inner = policy
@@ -289,22 +275,14 @@ class Wrapper(Policy):
         return self.inner.connect(machines)
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, Any]:
         """The other one's answer."""
         return self.inner.predict(observation, state, episode_start, deterministic)
 
 
 class OneEach(Policy):
-    """Policies side by side, one for each machine of a batch.
-
-    Args:
-        policies: One a machine.
-    """
+    """Policies side by side, one for each machine of a batch."""
 
     def __init__(self, policies: Sequence[Policy]) -> None:
         self._policies = list(policies)
@@ -320,11 +298,7 @@ class OneEach(Policy):
         return self._policies[0].connect(machines)
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, list[Any]]:
         """What each answers to its row of observations (n, size)."""
         n = len(self._policies)
@@ -373,11 +347,7 @@ class _Adapter:
         return self if self._for_drive is None else as_policy(self._for_drive(cues))
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, Any]:
         return self._given.predict(  # type: ignore[no-any-return]
             observation, state, episode_start, deterministic=deterministic

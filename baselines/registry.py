@@ -25,8 +25,7 @@ import yaml
 
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.registry import Registry
-from ..envs.settings import read_yaml
-from .presets import preset_names
+from ..envs.settings import preset_names, read_yaml
 
 if TYPE_CHECKING:
     from ..envs.platform.machines import Platform
@@ -52,38 +51,19 @@ PREDICTIVE: Final = ("mpc", "nmpc")
 _DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
 
-def register(name: str, factory: Factory | str, description: str = "", *, replace: bool = False) -> None:
-    """Give a policy a name that every command takes.
+register = POLICIES.register
+"""Give a policy's factory a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
-    Args:
-        name: One word without dots and slashes.
-        factory: Makes the policy for a machine; or ``"module:attribute"``, imported when it is needed.
-        description: One line for lists.
-        replace: Whether a name that is taken is given to the new policy.
+policy_names = POLICIES.names
+"""Names that :func:`make_policy` knows."""
 
-    Raises:
-        ConfigurationError: the name is not one word, or is taken.
-    """
-    POLICIES.register(name, factory, description, replace=replace)
-
-
-def policy_names() -> list[str]:
-    """Names :func:`make_policy` knows."""
-    return POLICIES.names()
+describe_policy = POLICIES.description
+"""One line about a policy."""
 
 
 def default_policies() -> list[str]:
     """Policies an evaluation compares where none is named."""
     return list(_DEFAULT)
-
-
-def describe_policy(name: str) -> str:
-    """One line about a policy.
-
-    Raises:
-        UnknownNameError: no policy has this name.
-    """
-    return POLICIES.description(name)
 
 
 def make_policy(name: Any, platform: Platform, *, force: bool = False) -> Policy:
@@ -164,19 +144,10 @@ def _import(module: str) -> Any:
     return loaded
 
 
-# The policies of this package. Factories import what they need.
-
-
 def _no_motion(platform: Platform) -> Policy:
     from .policy import NoMotion
 
     return NoMotion()
-
-
-def _per_maneuver(platform: Platform) -> Policy:
-    from .washout.classical import PerManeuverWashout
-
-    return PerManeuverWashout(platform)
 
 
 def _washout(name: str, platform: Platform) -> Policy:
@@ -225,7 +196,7 @@ def _register_own() -> None:
     register("no-motion", _no_motion, "the machine stands still")
     register(
         "classical-per-maneuver",
-        _per_maneuver,
+        f"{__package__}.washout.classical:PerManeuverWashout",
         "an oracle: classical with the best set for each standard maneuver",
     )
     for name, about in {

@@ -1,4 +1,4 @@
-"""The machine in CasADi's symbols: the twin of the kernels in ``envs``, for controllers that optimize.
+"""The machine in CasADi's symbols: the kernels' equations, for controllers that optimize.
 
 Kernels step a machine fast; an optimizer needs the same equations as expressions that it can differentiate.
 Nothing is simplified: both agree to round-off. The order of rotation is roll, pitch, yaw,
@@ -32,8 +32,7 @@ from ..envs.cues import GRAVITY
 from ..envs.errors import ConfigurationError
 from ..envs.platform import Hexapod, Platform, actuator_limits
 from ..envs.simulator.simulator import N_AXES
-from ..envs.storage import write_bytes, write_text
-from .presets import cache_folder
+from ..envs.storage import cache_folder, write_bytes, write_text
 
 try:
     import casadi

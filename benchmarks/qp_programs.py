@@ -18,8 +18,7 @@ from motion_cueing.baselines.mpc.prediction import (
     cue_scales,
     make_grid,
 )
-from motion_cueing.baselines.mpc.problem import Bounds, HorizonProgram, Motion, QuadraticCost
-from motion_cueing.baselines.mpc.solver import Plan, Planner
+from motion_cueing.baselines.mpc.solver import Bounds, HorizonProgram, Motion, Plan, Planner, QuadraticCost
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import rollout

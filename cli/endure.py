@@ -118,7 +118,7 @@ def _endurance(command: EndureCommand) -> Endurance:
 @contextmanager
 def _progress(seconds: float) -> Iterator[Progress]:
     """A bar on the error stream; Ctrl-C stops the drive when the bar next moves."""
-    from ..envs.interrupt import Interrupt
+    from ..envs.progress import Interrupt
     from ..evaluation.endurance.run import Stopped
 
     interrupt = Interrupt()

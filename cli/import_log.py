@@ -10,7 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from ..envs.errors import ConfigurationError
-from ..envs.logs.columns import ImportOptions, parse_columns
+from ..envs.logs.signals import ImportOptions, parse_columns
 from ..envs.storage import check_file, write_bytes
 from .arguments import Whole, option, several
 

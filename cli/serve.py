@@ -204,7 +204,7 @@ def _terminated_gently() -> Iterator[None]:
 
 
 def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
-    from ..envs.interrupt import Interrupt
+    from ..envs.progress import Interrupt
     from ..realtime.timing import undisturbed
 
     interrupt, limit = Interrupt(), command.duration

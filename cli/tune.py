@@ -83,7 +83,7 @@ class TuneCommand:
 def run(command: TuneCommand) -> int:
     """Search, and write the best parameters."""
     from ..baselines.washout.families import FAMILIES
-    from ..envs.interrupt import Interrupt
+    from ..envs.progress import Interrupt
 
     FAMILIES[command.algorithm]  # refuses an unknown one
     command = replace(command, out=_out(command))

@@ -110,7 +110,7 @@ def fields_table(cls: type[Any]) -> str:
 def action_table() -> str:
     """What an action of 1 stands for on each machine."""
     from motion_cueing.envs.platform import get_platform, platform_names
-    from motion_cueing.envs.task.observation import acceleration_scale
+    from motion_cueing.envs.task.kernels.action import acceleration_scale
 
     def cells(name: str) -> list[str]:
         scale = acceleration_scale(get_platform(name))
@@ -191,8 +191,8 @@ def link_packages() -> None:
 
 def write_tables() -> None:
     """Fill ``build/generated``."""
-    from motion_cueing.envs.task.observation import observation_table
-    from motion_cueing.envs.task.reward import reward_table
+    from motion_cueing.envs.task.kernels.observation import observation_table
+    from motion_cueing.envs.task.kernels.reward import reward_table
     from motion_cueing.evaluation.reporting.report import definitions
 
     texts = {

@@ -53,6 +53,13 @@ mat33: Any = wp.types.matrix((3, 3), real)
 mat63: Any = wp.types.matrix((6, 3), real)
 mat65: Any = wp.types.matrix((6, 5), real)
 
+int_array: Any = wp.array(dtype=int)
+bool_array: Any = wp.array(dtype=wp.bool)
+float_array: Any = wp.array(dtype=wp.float32)
+float_rows: Any = wp.array2d(dtype=wp.float32)
+real_rows: Any = wp.array2d(dtype=real)
+"""Types of arrays that kernels take; those of floats are what an agent sees and does."""
+
 
 def find_device(name: str) -> Any:
     """Warp's device of this name: "cpu", "cuda" or "cuda:0" and so on.

@@ -229,11 +229,11 @@ def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, 
         DataError: the file cannot be read, is empty, has ragged rows or a cell that is no number.
     """
     header, rows = _read_rows(path)
-    wanted = header if columns is None else columns
-    missing = [name for name in wanted if name not in header]
+    names = header if columns is None else columns
+    missing = [name for name in names if name not in header]
     if missing:
         raise DataError(f"{path}: missing column {', '.join(missing)}; found {', '.join(header)}")
-    return {name: _numbers(path, name, [row[header.index(name)] for _, row in rows]) for name in wanted}
+    return {name: _numbers(path, name, [row[header.index(name)] for _, row in rows]) for name in names}
 
 
 def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -270,16 +270,16 @@ def _check_table(path: str | Path, table: Mapping[str, Floats]) -> None:
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             many = f" ({len(bad)} such cells)" if len(bad) > 1 else ""
-            told = f"not a finite number{many}; fill the gap, or cut it out"
-            raise DataError(f"{path}: line {_line(path, bad[0])}, column {name}: {told}")
+            problem = f"not a finite number{many}; fill the gap, or cut it out"
+            raise DataError(f"{path}: line {_line(path, bad[0])}, column {name}: {problem}")
     for name in CSV_COLUMNS[1:]:
         largest, unit = next(bound for end, bound in _LARGEST.items() if name.endswith(end))
         beyond = np.flatnonzero(np.abs(table[name]) > largest)
         if len(beyond):
-            told = (
+            problem = (
                 f"{table[name][beyond[0]]:g} is beyond {largest:g} {unit}, which no car does; check the unit"
             )
-            raise DataError(f"{path}: line {_line(path, beyond[0])}, column {name}: {told}")
+            raise DataError(f"{path}: line {_line(path, beyond[0])}, column {name}: {problem}")
 
 
 def _line(path: str | Path, sample: int) -> int:
@@ -295,8 +295,8 @@ def _checked(trace: str, label: str, values: ArrayLike, shape: tuple[int | None,
     if len(array.shape) != len(shape) or any(
         w not in (None, h) for w, h in zip(shape, array.shape, strict=True)
     ):
-        wanted = "(" + ", ".join("n" if w is None else str(w) for w in shape) + ")"
-        raise DataError(f"{trace}: {label} has shape {array.shape}, expected {wanted}")
+        expected = "(" + ", ".join("n" if w is None else str(w) for w in shape) + ")"
+        raise DataError(f"{trace}: {label} has shape {array.shape}, expected {expected}")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=tuple(range(1, array.ndim))))
     if len(bad):
         raise DataError(f"{trace}: {label} is not finite at sample {bad[0]} ({len(bad)} samples in all)")

@@ -1,14 +1,15 @@
-"""Progress of long work on the error stream, so that results can be piped: bars on a terminal, else lines."""
+"""Progress of long work on the error stream, so that results can be piped, and Ctrl-C between its steps."""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Final
+from typing import Any, Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -20,12 +21,7 @@ _LOOK: Final = 0.3
 
 
 class Bar:
-    """One piece of work among :class:`Bars`.
-
-    Args:
-        bars: Where it is shown.
-        task: Its number there.
-    """
+    """One piece of work, with its number ``task``, among :class:`Bars`."""
 
     def __init__(self, bars: Progress, task: TaskID) -> None:
         self._bars, self._task = bars, task
@@ -59,11 +55,7 @@ class Bar:
 
 
 class Bars:
-    """Bars on a terminal, none elsewhere; lines are written above them in either case.
-
-    Args:
-        console: Where to write; default: the error stream.
-    """
+    """Bars on a terminal (the error stream), none elsewhere; lines are written above them in either case."""
 
     def __init__(self, console: Console | None = None) -> None:
         self.console = console or Console(stderr=True)
@@ -91,13 +83,7 @@ class Bars:
         self._bars.stop()
 
     def add(self, text: str, total: float, unit: str = "") -> Bar:
-        """Another bar.
-
-        Args:
-            text: What is at hand.
-            total: Work in all.
-            unit: What the work is counted in.
-        """
+        """Another bar, with what is at hand, and the work in all in its unit."""
         return Bar(self._bars, self._bars.add_task(text, total=total, unit=unit, note=""))
 
     def line(self, text: str) -> None:
@@ -107,27 +93,14 @@ class Bars:
 
 @contextmanager
 def progress(total: float, unit: str = "", text: str = "starting") -> Iterator[Bar]:
-    """A bar for one piece of work.
-
-    Args:
-        total: Work in all.
-        unit: What the work is counted in.
-        text: What is at hand at first.
-    """
+    """A bar for one piece of work: the work in all in its unit, and what is at hand at first."""
     with Bars() as bars:
         yield bars.add(text, total, unit)
 
 
 @contextmanager
 def drives_progress(total: int) -> Iterator[Callable[[str, str], None]]:
-    """A bar for drives, one after another.
-
-    Args:
-        total: Number of drives.
-
-    Yields:
-        To be called before each drive with two words about it, such as maneuver and policy.
-    """
+    """A bar for drives; yields what to call before each with two words, such as maneuver and policy."""
     with progress(total, "drives") as bar:
         begun = 0
 
@@ -156,11 +129,7 @@ def compilation_announced() -> Iterator[None]:
 
 
 def watch_cache(over: threading.Event) -> None:
-    """Look into Warp's cache until this process compiles there, and say so.
-
-    Args:
-        over: Ends it.
-    """
+    """Look into Warp's cache until this process compiles there, and say so; ``over`` ends it."""
     mark = f"_p{os.getpid()}_"
     while not over.wait(_LOOK):
         warp = sys.modules.get("warp")
@@ -168,3 +137,27 @@ def watch_cache(over: threading.Event) -> None:
         if folder and os.path.isdir(folder) and any(mark in name for name in os.listdir(folder)):
             print(COMPILING, file=sys.stderr, flush=True)
             return
+
+
+class Interrupt:
+    """Whether Ctrl-C was pressed; the second time it interrupts at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    @contextmanager
+    def caught(self) -> Iterator[None]:
+        """Hold SIGINT back within the block; only the main thread can."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        earlier = signal.signal(signal.SIGINT, self._ask)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, earlier)
+
+    def _ask(self, number: int, frame: Any) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True

@@ -49,7 +49,7 @@ class Registry(Generic[T]):
         self._discovered = False
 
     def register(self, name: str, item: T | str, description: str = "", *, replace: bool = False) -> None:
-        """Register an item.
+        """Give an item a name, which every command and configuration then knows.
 
         Args:
             name: Its name.
@@ -109,6 +109,11 @@ class Registry(Generic[T]):
                     f"{self.kind} {name!r}: {entry.item} cannot be loaded ({error})"
                 ) from error
         return entry.item  # type: ignore[no-any-return]
+
+    def make(self, name: str) -> Any:
+        """The item of a name; where that is a class or a function, what it makes."""
+        item: Any = self[name]
+        return item() if callable(item) else item
 
     def _entry(self, name: str) -> _Entry:
         self._discover()

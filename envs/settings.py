@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 
@@ -16,7 +17,7 @@ from pydantic import AliasChoices, ConfigDict, Field, TypeAdapter, ValidationErr
 from pydantic.dataclasses import dataclass
 from typing_extensions import dataclass_transform
 
-from .errors import ConfigurationError, DataError, suggest
+from .errors import ConfigurationError, DataError, UnknownNameError, suggest
 from .storage import write_text
 
 _STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
@@ -60,6 +61,20 @@ def configuration(cls: type[T]) -> type[T]:
 
     made.__init__ = checked
     return made  # type: ignore[no-any-return]
+
+
+def check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse a field with a name that is not known, where a configuration is made."""
+    known = list(known)
+    for name in names:
+        if name not in known:
+            raise ValueError(str(UnknownNameError(kind, name, known)))
+
+
+def check_range(name: str, limits: Vector2) -> None:
+    """Refuse a field whose limits are not low and high, where a configuration is made."""
+    if limits[0] > limits[1]:
+        raise ValueError(f"{name} must be a range from low to high, found {list(limits)}")
 
 
 def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:
@@ -166,3 +181,27 @@ def _yaml_problem(error: yaml.YAMLError, text: str) -> str:
 def save(config: Any, path: str | Path) -> None:
     """Write a configuration as YAML, whole or not at all."""
     write_text(path, yaml.safe_dump(to_dict(config), sort_keys=False))
+
+
+def preset_names(folder: Path) -> list[str]:
+    """Names of the parameter sets in a folder."""
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def named(cls: type[Any], values: object, path: str | Path) -> object:
+    """Values of a user's parameter file, in which ``name`` and ``description`` may stand or not.
+
+    Args:
+        cls: The configuration it is of.
+        values: That stand in the file.
+        path: Of the file; its stem is the name unless one is given.
+    """
+    if not isinstance(values, dict):
+        return values
+    known = {field.name for field in dataclasses.fields(cls)}
+    if "algorithm" not in known and values.get("algorithm") == "classical":
+        # A file without an algorithm is a classical washout's, and may say so.
+        values = {name: value for name, value in values.items() if name != "algorithm"}
+    if "name" in known:
+        return {"name": Path(path).stem, "description": f"set of {path}", **values}
+    return {name: value for name, value in values.items() if name not in ("name", "description")}

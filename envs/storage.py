@@ -51,6 +51,19 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         file.write(data)
 
 
+def cache_folder() -> Path:
+    """Folder for results that take long to compute; it may be deleted at any time.
+
+    It is ``MOTION_CUEING_CACHE`` of the environment, else ``motion-cueing`` in ``XDG_CACHE_HOME`` or in
+    ``~/.cache``.
+    """
+    chosen = os.environ.get("MOTION_CUEING_CACHE")
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "motion-cueing"
+
+
 # What a user names: files, and where a command writes, checked before the work.
 
 
@@ -60,11 +73,9 @@ def is_file(name: str) -> bool:
 
 
 def check_folder(option: str, folder: Path) -> None:
-    """Refuse a folder that cannot be written. It is not made: a wrong argument later leaves nothing behind.
+    """Refuse a folder, named by an option such as ``--out``, that cannot be written.
 
-    Args:
-        option: That names it, such as ``--out``.
-        folder: It need not exist.
+    It need not exist, and is not made: a wrong argument later leaves nothing behind.
 
     Raises:
         DataError: it is a file or lies below one, or it takes no files.
@@ -73,11 +84,7 @@ def check_folder(option: str, folder: Path) -> None:
 
 
 def check_file(option: str, file: Path) -> None:
-    """Refuse a file that cannot be written.
-
-    Args:
-        option: That names it, such as ``--out``.
-        file: It need not exist, nor its folder.
+    """Refuse a file that cannot be written; neither it nor its folder need exist.
 
     Raises:
         DataError: it is a folder or lies below a file, or its folder takes no files.
@@ -90,13 +97,8 @@ def check_file(option: str, file: Path) -> None:
 def check_own_json(option: str, file: Path, keys: frozenset[str]) -> None:
     """Refuse to write over a file of JSON that is none of ours.
 
-    Args:
-        option: That names its folder, such as ``--out``.
-        file: It need not exist.
-        keys: That every version of ours has.
-
     Raises:
-        DataError: it is another's.
+        DataError: it has not the ``keys`` that every version of ours has.
     """
     if not file.exists():
         return

@@ -18,7 +18,7 @@ from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.platform import Platform, actuator_limits
 from ..envs.platform.kernels import ACTUATORS
-from ..envs.platform.limits import limits_exceeded
+from ..envs.platform.machines import limits_exceeded
 from .inbox import Address
 from .packets import NO_SEQUENCE, Cues, Format, SetPoint
 from .server import Endpoint

@@ -25,7 +25,7 @@ from ..envs.errors import ConfigurationError
 from ..envs.platform import Platform
 from ..envs.platform.kernels.step import TURNTABLE
 from ..envs.settings import NonNegative, Positive, configuration
-from ..envs.task.observation import acceleration_scale
+from ..envs.task.kernels.action import acceleration_scale
 
 Floats = NDArray[np.float64]
 

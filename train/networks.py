@@ -18,7 +18,7 @@ from torch import nn
 from ..envs.errors import DataError
 from ..envs.platform.kernels.step import AXES
 from ..envs.task.batch import Batch
-from ..envs.task.observation import MACHINE, Layout
+from ..envs.task.kernels.observation import MACHINE, Layout
 from .agents import Network
 
 Floats = NDArray[np.float32]

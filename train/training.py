@@ -17,10 +17,10 @@ from typing import Any, Final
 
 from ..baselines import ClassicalWashout
 from ..envs.errors import ConfigurationError
-from ..envs.interrupt import Interrupt
+from ..envs.progress import Interrupt
 from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
-from ..envs.task.drives import platform_of
+from ..envs.task.episode import platform_of
 from .agents import Agent, Network, Record
 from .agents.agent import DEFAULT, base_parameters
 from .config import Measure, TrainingConfig

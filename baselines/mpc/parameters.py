@@ -8,10 +8,18 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from ...envs.errors import ConfigurationError
-from ...envs.settings import NonNegative, Positive, configuration, from_dict, read_yaml
+from ...envs.errors import ConfigurationError, UnknownNameError
+from ...envs.settings import (
+    NonNegative,
+    Positive,
+    configuration,
+    from_dict,
+    load,
+    named,
+    preset_names,
+    read_yaml,
+)
 from ...envs.simulator.simulator import TIME_STEP
-from ..presets import load_preset, named, preset_names
 
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Whole = Annotated[int, Field(ge=1, le=100)]
@@ -195,7 +203,9 @@ def load_mpc(name: str | Path) -> MpcParameters:
         ConfigurationError: a field is wrong.
     """
     if Path(name).suffix not in (".yaml", ".yml"):
-        return load_preset(MpcParameters, "predictive controller", name, _PRESETS)
+        if str(name) not in mpc_presets():
+            raise UnknownNameError("predictive controller", str(name), mpc_presets())
+        return load(MpcParameters, _PRESETS / f"{name}.yaml")
     values = read_yaml(name)
     if isinstance(values, dict) and values.get("algorithm") == "nmpc":
         # Earlier versions held the linear controller in a block of its own.

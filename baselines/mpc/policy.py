@@ -20,12 +20,19 @@ from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from ...envs.simulator.kernels.observation import read
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
-from ..policy import Array, Information, Policy, checked_episode_start, checked_observation, wrong_state
+from ..policy import (
+    Array,
+    Information,
+    Policy,
+    Starts,
+    checked_episode_start,
+    checked_observation,
+    wrong_state,
+)
 from ..symbolic import SymbolicMachine, cs
 from .parameters import MpcParameters
 from .prediction import REST, Floats, Forecaster
-from .problem import moving_axes
-from .solver import Plan, Planner, Rows
+from .solver import Plan, Planner, Rows, moving_axes
 
 try:
     from threadpoolctl import ThreadpoolController
@@ -65,12 +72,7 @@ class Brakes:
         self._moving = np.isin(np.arange(N_AXES), moving_axes(platform))
 
     def __call__(self, position: Floats, rate: Floats) -> Floats:
-        """(9,) accelerations for the next time step.
-
-        Args:
-            position: (9,) of the axes.
-            rate: (9,).
-        """
+        """(9,) accelerations for the next time step, from positions and rates (9,) of the axes."""
         legs = np.asarray(self._rates(position, rate))[:, 0]
         actuators = np.concatenate([rate[:2], legs, rate[8:]])
         reference = actuators - np.clip(actuators, -self._change, self._change)
@@ -207,11 +209,7 @@ class PredictiveController(Policy):
         return {f"mpc_{name}": str(value) for name, value in vars(self._counts).items()}
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, Any]:
         """Accelerations; see :meth:`~..policy.Policy.predict`. The state is a memory for each machine.
 
@@ -307,11 +305,7 @@ class PreviewController(Policy):
         self._planner = Planner(platform, parameters)
 
     def for_drive(self, cues: CueTrace) -> PredictiveController:
-        """The policy for one drive.
-
-        Args:
-            cues: The drive, at the machine's time step.
-        """
+        """The policy for one drive, at the machine's time step."""
         return PredictiveController(self.platform, self.parameters, self.name, self._planner, cues)
 
 

@@ -1,7 +1,7 @@
 """Plans of whole drives: their cache on disk, and their playback through the machine's own step.
 
-Plans lie in the folder ``optimum`` of :func:`~..presets.cache_folder`, by a hash of all they depend on.
-Playback tells whether a plan keeps every limit, its J, and the state that it leads to.
+Plans lie in the folder ``optimum`` of :func:`~motion_cueing.envs.storage.cache_folder`, by a hash of all they
+depend on. Playback tells whether a plan keeps every limit, its J, and the state that it leads to.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ from ...envs.platform.kernels.step import SINGULAR
 from ...envs.platform.machines import UNITY
 from ...envs.settings import to_dict
 from ...envs.simulator.simulator import N_AXES, Simulator, Snapshot
-from ...envs.storage import write_bytes
-from ..presets import cache_folder
+from ...envs.storage import cache_folder, write_bytes
 from .program import OptimumOptions
 
 Floats = NDArray[np.float64]

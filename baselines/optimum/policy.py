@@ -4,76 +4,58 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Mapping
-from types import TracebackType
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError
 from ...envs.perception import VestibularModel, get_vestibular_model
 from ...envs.platform import Platform, get_platform
+from ...envs.progress import progress
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE, read
 from ...envs.simulator.simulator import N_AXES
-from ..policy import WHOLE_DRIVE, Policy, checked_episode_start, checked_observation, wrong_state
+from ..policy import (
+    WHOLE_DRIVE,
+    Array,
+    Policy,
+    Starts,
+    checked_episode_start,
+    checked_observation,
+    wrong_state,
+)
 from .plan import Plan, key_of, load_plan, store_plan
 from .program import OptimumOptions
-from .windows import Planner
+from .windows import OnWindow, Planner
 
 _PATIENCE: Final = 2.0
 """Time after which the bar is shown, s."""
 
-OnWindow = Callable[[float, int], None]
 
+@contextmanager
+def solve_progress(label: str, enabled: bool = True) -> Iterator[OnWindow | None]:
+    """A bar over the windows of a drive, on a terminal, once the solve takes long and if it is ``enabled``.
 
-class SolveProgress:
-    """A progress bar over the windows of a drive, on a terminal, where the solve takes long.
-
-    Args:
-        label: Name of the solve.
-        enabled: Whether to show it at all: a command that has a bar of its own does without.
+    Yields:
+        To be called with the share that is done and the iterations; None where nothing is shown.
     """
+    if not (enabled and sys.stderr.isatty()):
+        yield None
+        return
+    began, bar = time.monotonic(), None
+    with ExitStack() as shown:
 
-    def __init__(self, label: str, enabled: bool = True) -> None:
-        self._label, self._began = label, time.monotonic()
-        self._enabled = enabled and sys.stderr.isatty()
-        self._bar: Progress | None = None
+        def on_window(share: float, iterations: int) -> None:
+            nonlocal bar
+            if bar is None and time.monotonic() - began >= _PATIENCE:
+                bar = shown.enter_context(progress(100.0, "%", label))
+            if bar is not None:
+                bar.move(100.0 * share, note=f"iteration {iterations}")
 
-    @property
-    def on_window(self) -> OnWindow | None:
-        """Called with the share that is done and the iterations; None where nothing is shown."""
-        return self._update if self._enabled else None
-
-    def __enter__(self) -> SolveProgress:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def _update(self, share: float, iterations: int) -> None:
-        if time.monotonic() - self._began < _PATIENCE:
-            return
-        if self._bar is None:
-            self._bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn("iteration {task.fields[iterations]}"),
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
-                transient=True,
-                auto_refresh=False,
-            )
-            self._bar.start()
-            self._bar.add_task(self._label, total=1.0, iterations=0)
-        self._bar.update(self._bar.task_ids[0], completed=share, iterations=iterations)
-        self._bar.refresh()
+        yield on_window
 
 
 _SAME: Final = 1e-3
@@ -108,10 +90,7 @@ class Optimum(Policy):
         self._cached, self._progress = cached, progress
 
     def for_drive(self, cues: CueTrace) -> PlannedDrive:
-        """The policy for one drive: solved here, or loaded from disk.
-
-        Args:
-            cues: The drive, at the time step of the rollout.
+        """The policy for one drive, at the time step of the rollout: solved here, or loaded from disk.
 
         Raises:
             ConfigurationError: the cues are no CueTrace.
@@ -137,8 +116,8 @@ class Optimum(Policy):
         stored = load_plan(key, len(cues) - 1) if self._cached else None
         if stored is not None:
             return stored
-        with SolveProgress(f"{self.name}: {cues.name}", self._progress) as progress:
-            planner = Planner(self.platform, self.parameters, self.vestibular, cues, pose, progress.on_window)
+        with solve_progress(f"{self.name}: {cues.name}", self._progress) as on_window:
+            planner = Planner(self.platform, self.parameters, self.vestibular, cues, pose, on_window)
             plan = planner.plan()
         if self._cached:
             store_plan(key, plan)
@@ -166,19 +145,11 @@ class PlannedDrive(Policy):
         return self.plan.report.notes()
 
     def predict(
-        self,
-        observation: NDArray[Any],
-        state: Any = None,
-        episode_start: NDArray[Any] | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[NDArray[np.float64], Any]:
-        """The next accelerations of the plan; none after its end.
+        """The next accelerations of the plan; none after its end. The state is the number of steps done.
 
-        Args:
-            observation: (1, OBSERVATION_SIZE) or (OBSERVATION_SIZE,); only the first one matters.
-            state: The number of steps done; None at first.
-            episode_start: (1,) whether the drive begins anew.
-            deterministic: No effect.
+        Of the observations of one machine only the first matters.
 
         Raises:
             DataError: an argument has the wrong type or shape, or the observation is not finite.

@@ -162,12 +162,7 @@ _PUSH: Final = (3.0, 3.0, 3.0, 3.0, 3.0, 2.0, 2.0, 2.0, 2.0)
 
 def effort(q: Expression, v: Expression, a: Expression, b: Expression) -> Expression:
     """Displacements, rates, accelerations and their changes on an interval, each in its large value."""
-    parts = (
-        q / cs.DM(_REACH),
-        v / cs.DM(_PACE),
-        0.5 * (a + b) / cs.DM(_PUSH),
-        (b - a) / cs.DM(_PUSH),
-    )
+    parts = (q / cs.DM(_REACH), v / cs.DM(_PACE), 0.5 * (a + b) / cs.DM(_PUSH), (b - a) / cs.DM(_PUSH))
     return cs.vertcat(*parts)
 
 

@@ -10,8 +10,6 @@ Gauss and Newton, which keeps every step a descent; that of the limits is exact.
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...envs.progress import Interrupt
 from ...envs.simulator.simulator import N_AXES
 from ..symbolic import Expression, cs
 from .program import Interval, NodeLimits, OptimumOptions, effort
@@ -28,23 +27,18 @@ OnIteration = Callable[[int], None]
 
 
 class SolveMonitor:
-    """Counts the iterations of a solve, and ends it after the iteration at hand on Ctrl-C.
-
-    Args:
-        on_iteration: Called with the number of iterations done.
-    """
+    """Counts the iterations of a solve, for ``on_iteration``, and ends it on Ctrl-C after the one at hand."""
 
     def __init__(self, on_iteration: OnIteration | None = None) -> None:
         self._on_iteration = on_iteration
-        self._iterations = 0
-        self._interrupted = False
+        self._iterations, self._interrupt = 0, Interrupt()
 
     def count(self) -> bool:
         """Count an iteration; returns whether to stop."""
         self._iterations += 1
         if self._on_iteration is not None:
             self._on_iteration(self._iterations)
-        return self._interrupted
+        return self._interrupt.asked
 
     @contextmanager
     def solving(self) -> Iterator[None]:
@@ -55,20 +49,11 @@ class SolveMonitor:
         Raises:
             KeyboardInterrupt: at the end of the solve, if Ctrl-C was pressed in it.
         """
-        self._iterations, self._interrupted = 0, False
-        if threading.current_thread() is not threading.main_thread():
+        self._iterations, self._interrupt = 0, Interrupt()
+        with self._interrupt.caught():
             yield
-            return
-        before = signal.signal(signal.SIGINT, lambda number, frame: self._interrupt())
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, before)
-        if self._interrupted:
+        if self._interrupt.asked:
             raise KeyboardInterrupt
-
-    def _interrupt(self) -> None:
-        self._interrupted = True
 
 
 def iteration_callback(
@@ -218,13 +203,7 @@ class Transcription:
         monitor: Counts iterations.
     """
 
-    def __init__(
-        self,
-        blocks: Blocks,
-        intervals: int,
-        ipopt: dict[str, Any],
-        monitor: SolveMonitor,
-    ) -> None:
+    def __init__(self, blocks: Blocks, intervals: int, ipopt: dict[str, Any], monitor: SolveMonitor) -> None:
         self.blocks, self.intervals = blocks, intervals
         n = blocks.node_size
         self._x = cs.MX.sym("x", n * (intervals + 1))

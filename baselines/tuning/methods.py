@@ -1,6 +1,6 @@
 """Methods of a search: CMA-ES, and Adam along the gradient of J through washout and machine.
 
-Both work in the unit cube of a :class:`~.space.WashoutSpace`, on a few drives at a time. Every
+Both work in the unit cube of a :class:`~.objective.WashoutSpace`, on a few drives at a time. Every
 :data:`TRY_EVERY` steps they evaluate their best on all drives (a trial); only trials can be the result.
 
 **CMA-ES** (Hansen and Ostermeier 2001, by the package ``cma``): a generation of sets, each through all drives
@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from ...envs.settings import NonNegative, configuration
 from ..washout.batch import WashoutBatch
 from ..washout.families import family_of
-from .objective import Objective
-from .space import WashoutSpace
+from .objective import Objective, WashoutSpace
 
 Floats = NDArray[np.float64]
 

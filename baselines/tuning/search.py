@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -18,12 +17,12 @@ from pydantic import Field
 
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.maneuvers import RandomDrives, drive_seeds
+from ...envs.provenance import package_version
 from ...envs.settings import Positive, configuration, from_dict, renamed, to_dict
 from ...envs.storage import write_text
 from ..washout.families import AnyWashout, family_of
 from .methods import CmaEs, GradientDescent, Method, StepResult
-from .objective import LIMIT_SLOPE, LIMIT_STEP, Measure, Objective
-from .space import WashoutSpace
+from .objective import LIMIT_SLOPE, LIMIT_STEP, Measure, Objective, WashoutSpace
 
 TRAIN: Final = "train"
 """Name of the random drives; the standard maneuvers are for evaluation."""
@@ -235,7 +234,7 @@ def checksum(options: TuningOptions, objective: Objective, space: WashoutSpace, 
     machine, the penalty, every coordinate with its range, the constants of the method, and versions.
     """
     parts = {
-        "package": _version(),
+        "package": package_version(),
         "options": to_dict(replace(options, budget=1.0)),
         "drives": [drive.digest() for drive in objective.drives],
         "spared": sorted(objective.exempt),
@@ -245,14 +244,6 @@ def checksum(options: TuningOptions, objective: Objective, space: WashoutSpace, 
         "method": method.settings,
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def _version() -> str:
-    """Version of this package; empty in a folder that was not installed."""
-    try:
-        return version("motion-cueing-gym")
-    except PackageNotFoundError:
-        return ""
 
 
 def _method(options: TuningOptions, space: WashoutSpace) -> Method:

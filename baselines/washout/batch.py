@@ -16,8 +16,7 @@ from ...envs.cues import CueTrace
 from ...envs.errors import ConfigurationError
 from ...envs.platform import Platform
 from ...envs.platform.kernels.step import SetPoint
-from ...envs.simulator.kernels.gradient import add_cue_error, step_with_adjoint
-from ...envs.simulator.kernels.step import CueCost, State, zone
+from ...envs.simulator.kernels.step import CueCost, State, add_cue_error, step_with_adjoint, zone
 from ...envs.simulator.simulator import Simulator
 from .families import FamilyParameters, family_of
 from .kernels.launch import Score
@@ -54,10 +53,7 @@ class WashoutBatch:
     """
 
     def __init__(
-        self,
-        sets: Sequence[FamilyParameters],
-        drives: Sequence[CueTrace],
-        platform: Platform,
+        self, sets: Sequence[FamilyParameters], drives: Sequence[CueTrace], platform: Platform
     ) -> None:
         if not sets or not drives:
             raise ConfigurationError("a washout batch needs at least one parameter set and one drive")

@@ -22,8 +22,7 @@ from pydantic import PlainValidator
 
 from ...envs.errors import ConfigurationError, UnknownNameError
 from ...envs.registry import Registry
-from ...envs.settings import Vector2, Vector3, configuration, from_dict, load, read_yaml
-from ..presets import named, preset_names
+from ...envs.settings import Vector2, Vector3, configuration, from_dict, load, named, preset_names, read_yaml
 from ..registry import register_presets
 from .kernels.launch import Kernels
 

@@ -14,7 +14,7 @@ from ...envs.arrays import real, vec9
 from ...envs.platform.machines import Cab, Platform
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
-from ..policy import Array, Policy, checked_episode_start, checked_observation, wrong_state
+from ..policy import Array, Policy, Starts, checked_episode_start, checked_observation, wrong_state
 from .families import FAMILIES, FamilyParameters, family_of, load_of, load_parameters
 from .kernels.launch import Kernels
 
@@ -111,11 +111,7 @@ class WashoutPolicy(Policy, Generic[P]):
         return type(self)(replace(parameters, turntable_share=0.0), platform.cab, self.time_step)
 
     def predict(
-        self,
-        observation: Array,
-        state: Any = None,
-        episode_start: Array | None = None,
-        deterministic: bool = True,
+        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
     ) -> tuple[Array, NDArray[Any]]:
         """Accelerations for observations; see :class:`~motion_cueing.baselines.policy.Policy`.
 

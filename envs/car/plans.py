@@ -126,9 +126,6 @@ def _integral(values: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(0.5 * STEP * (values[1:] + values[:-1]))))
 
 
-# Speed schedules, made of steps a person would name: hold, change.
-
-
 DT: Final = 0.01
 """Time step of schedules and of the cues, s."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import field
 from dataclasses import replace as replaced
 from typing import Annotated, Any, Final
@@ -185,9 +184,6 @@ class Car:
         return self.steering.ratio * road_wheel * lateral_acceleration
 
 
-# The cars of the package, by name.
-
-
 SEDAN: Final = Car(
     name="sedan",
     description="1814 kg sedan, the car of the paper",
@@ -313,28 +309,11 @@ for _car in (SEDAN, BMW_320I, VOLVO_V40, E_CLASS_SUV):
     _CARS.register(_car.name, _car, _car.description)
 
 
-def register(
-    name: str, car: Car | Callable[[], Car] | str, description: str = "", *, replace: bool = False
-) -> None:
-    """Give a car a name, which every command and configuration then knows.
+register = _CARS.register
+"""Give a car, or what makes it, a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
-    An installed package can do the same by an entry point of the group ``motion_cueing.cars``.
-
-    Args:
-        name: What it is called, in tables, too.
-        car: A car, a function that makes it, or ``"module:attribute"`` where either is.
-        description: One line for lists; default: the car's own.
-        replace: Whether a name that is taken is given to the new one.
-
-    Raises:
-        ConfigurationError: the name is not one word, or is taken.
-    """
-    _CARS.register(name, car, description, replace=replace)
-
-
-def car_names() -> list[str]:
-    """Names that :func:`get_car` knows, the paper's car first."""
-    return _CARS.names()
+car_names = _CARS.names
+"""Names that :func:`get_car` knows, the paper's car first."""
 
 
 def describe_car(name: str) -> str:
@@ -348,6 +327,5 @@ def get_car(name: str) -> Car:
     Raises:
         UnknownNameError: no such car; the message lists the nearest names.
     """
-    item = _CARS[name]
-    car: Car = item() if callable(item) else item
+    car: Car = _CARS.make(name)
     return car if car.name == name else replaced(car, name=name)

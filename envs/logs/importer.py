@@ -12,9 +12,20 @@ import numpy as np
 
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
-from .columns import FORCES, RATES, ImportOptions, RawLog, read_log
 from .mounting import Estimate, estimate, gather, shift, speed_delay
-from .timing import GapPolicy, Grid, Timing, close_gaps, low_pass, make_grid, on_grid
+from .signals import (
+    FORCES,
+    RATES,
+    Grid,
+    ImportOptions,
+    RawLog,
+    Timing,
+    close_gaps,
+    low_pass,
+    make_grid,
+    on_grid,
+    read_log,
+)
 
 SPEED_CUTOFF_HZ: Final = 1.0
 """Cut-off of the speed channel, Hz: satellite and wheel speeds come in steps of about a tenth of a second."""
@@ -94,7 +105,7 @@ def import_log(
         columns: Column of each signal (``time``, ``force_x`` to ``force_z``, ``rate_x`` to
             ``rate_z``, and, if there are any, ``speed`` and ``course``). A leading ``-``
             reverses a column; a number stands for a constant.
-        units: Unit of each signal, see :data:`.log_columns.UNITS`; SI by default.
+        units: Unit of each signal, see :data:`.signals.UNITS`; SI by default.
         options: Rate, filter, gaps, and what shall not be estimated.
         name: Name of the trace; that of the file by default.
 
@@ -103,9 +114,8 @@ def import_log(
         DataError: the log is broken, or does not show what has to be estimated.
     """
     options = options or ImportOptions()
-    policy = GapPolicy(options.gaps, options.longest_step_s, options.longest_gap_s)
     log = _cut(read_log(path, columns, units or {}), options)
-    series, timing = close_gaps(log, policy)
+    series, timing = close_gaps(log, options)
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
     raw = {signal: on_grid(values, grid) for signal, values in series.items()}
     findings = _find(raw, grid, timing, options)
@@ -160,7 +170,7 @@ def _stacked(signals: Mapping[str, Floats], names: tuple[str, ...]) -> Floats:
 
 def _cut(log: RawLog, options: ImportOptions) -> RawLog:
     """The rows between start and end; the course made continuous."""
-    # A row without a stamp is kept, for the gap policy to judge.
+    # A row without a stamp stays: it is a gap.
     before = log.time < options.start_s
     after = log.time > (math.inf if options.end_s is None else options.end_s)
     keep = ~(before | after)

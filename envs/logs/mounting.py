@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ..cues import Floats
 from ..errors import DataError
-from .columns import ImportOptions, Sign
-from .timing import low_pass
+from .signals import ImportOptions, Sign, low_pass
 
 
 @dataclass(frozen=True)
@@ -69,9 +68,6 @@ def level(rest: ArrayLike) -> tuple[float, float]:
     """
     x, y, z = np.asarray(rest, dtype=np.float64)
     return float(np.arctan2(-y, -z)), float(np.arctan2(x, np.hypot(y, z)))
-
-
-# Evidence: the smoothed signals that an estimate uses.
 
 
 SMOOTHING_HZ: Final = 0.5
@@ -183,9 +179,6 @@ def correlation(a: Floats, b: Floats) -> float:
     a, b = a - a.mean(), b - b.mean()
     scale = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b) / scale if scale > 0.0 else 0.0
-
-
-# The estimate.
 
 
 CLEAR: Final = 0.3

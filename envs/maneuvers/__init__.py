@@ -8,12 +8,19 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .recordings import describe_recording, get_recording, recording_names
-from .registry import describe_maneuver, get_maneuver, maneuver_names, register
+from .registry import (
+    describe_maneuver,
+    describe_recording,
+    get_maneuver,
+    get_recording,
+    maneuver_names,
+    recording_names,
+    register,
+)
 
 if TYPE_CHECKING:
-    from .maneuver import Maneuver
     from .sampling import RandomDrives, drive_seeds, random_drive, random_drives
+    from .standard import Maneuver
 
 __all__ = [
     "Maneuver",
@@ -34,5 +41,5 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = "maneuver" if name == "Maneuver" else "sampling"
+    module = "standard" if name == "Maneuver" else "sampling"
     return getattr(import_module(f"{__name__}.{module}"), name)

@@ -27,7 +27,8 @@ from ..car.vehicles import Car
 from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .maneuver import KMH, Maneuver
+from .roads import KMH
+from .standard import Maneuver
 
 Floats = NDArray[np.float64]
 
@@ -153,9 +154,6 @@ def clearance(trace: CueTrace, car: Car, gates: Sequence[Gate]) -> float:
     return least
 
 
-# The maneuvers.
-
-
 TEST_DRIVER = Driver(preview_time=0.7)
 """Aims nearer than in traffic."""
 
@@ -178,14 +176,14 @@ def practised_path(gates: tuple[Gate, ...], car: Car, speed: float, length: floa
     """The line to aim at so that the car, which lags behind its driver's aim, drives the smoothest way.
 
     As on a proving ground the driver practises: after every run the aim is shifted by the deviation of the
-    car from the wanted way (iterative learning).
+    car from the planned way (iterative learning).
     """
-    x, wanted = smoothest_way(gates, car, speed, length, margin)
-    aim = wanted
+    x, way = smoothest_way(gates, car, speed, length, margin)
+    aim = way
     schedule = Schedule.of(speed, [Hold(length / speed)])
     for _ in range(LAPS):
         trace = simulate([Plan("practice", car, Path.of_offset(x, aim), schedule, driver=TEST_DRIVER)])[0]
-        missed = wanted - np.interp(x, trace.channels["x_m"], trace.channels["y_m"])
+        missed = way - np.interp(x, trace.channels["x_m"], trace.channels["y_m"])
         missed[x > gates[-1].end] = 0.0
         aim = aim + LEARNED * gaussian_filter1d(missed, BLUR / GRID, mode="nearest")
     return Path.of_offset(x, aim)

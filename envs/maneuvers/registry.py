@@ -1,14 +1,22 @@
-"""Maneuvers by name, open to other packages; names and descriptions import no maneuver."""
+"""Maneuvers and recorded drives by name, open to other packages; their names import no maneuver.
+
+A recorded drive lies in a folder of its own under ``recorded``, with the notice of its license and the
+command that converted it from the published log.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ..cues import CueTrace
+from ..errors import look_up
 from ..registry import Registry
 
 if TYPE_CHECKING:
-    from .maneuver import Maneuver
+    from .standard import Maneuver
 
 _MANEUVERS: Final[Registry[Any]] = Registry("maneuver", "motion_cueing.maneuvers")
 
@@ -29,37 +37,14 @@ for _name, _where, _about in (
     _MANEUVERS.register(_name, f"{__package__}.{_where}", _about)
 
 
-def register(
-    name: str,
-    maneuver: Maneuver | Callable[[], Maneuver] | str,
-    description: str = "",
-    *,
-    replace: bool = False,
-) -> None:
-    """Give a maneuver a name, which every command and configuration then knows.
+register = _MANEUVERS.register
+"""Give a maneuver or its class a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
-    An installed package can do the same by an entry point of the group ``motion_cueing.maneuvers``.
+maneuver_names = _MANEUVERS.names
+"""Names that :func:`get_maneuver` knows, the paper's three first."""
 
-    Args:
-        name: What it is called.
-        maneuver: A :class:`~.maneuver.Maneuver`, its class, or ``"module:attribute"`` where either is.
-        description: One line for lists.
-        replace: Whether a name that is taken is given to the new one.
-
-    Raises:
-        ConfigurationError: the name is not one word, or is taken.
-    """
-    _MANEUVERS.register(name, maneuver, description, replace=replace)
-
-
-def maneuver_names() -> list[str]:
-    """Names that :func:`get_maneuver` knows, the paper's three first."""
-    return _MANEUVERS.names()
-
-
-def describe_maneuver(name: str) -> str:
-    """One line about a maneuver."""
-    return _MANEUVERS.description(name)
+describe_maneuver = _MANEUVERS.description
+"""One line about a maneuver."""
 
 
 def get_maneuver(name: str) -> Maneuver:
@@ -68,6 +53,34 @@ def get_maneuver(name: str) -> Maneuver:
     Raises:
         UnknownNameError: no such maneuver; the message lists the nearest names.
     """
-    item = _MANEUVERS[name]
-    found: Maneuver = item() if callable(item) else item
-    return found
+    maneuver: Maneuver = _MANEUVERS.make(name)
+    return maneuver
+
+
+_FOLDER: Final = Path(__file__).parent / "recorded"
+_FILE: Final = "cues.csv.gz"
+
+_SOURCES: Final[Mapping[str, str]] = {
+    "city-drive": "214 s through a city, turns and a rough stretch; log by Paul Balzer, CC BY-SA 2.0",
+    "commute": "60 s of a commute, speeding up and slowing down; comma2k19 by comma.ai, MIT",
+}
+
+
+def recording_names() -> list[str]:
+    """Names of the recorded drives."""
+    return sorted(_SOURCES)
+
+
+def describe_recording(name: str) -> str:
+    """One line about a recorded drive, with its source."""
+    return look_up("recording", name, _SOURCES)
+
+
+def get_recording(name: str) -> CueTrace:
+    """A recorded drive: 100 Hz, F_A axes, with the channel ``speed_m_s``.
+
+    Raises:
+        UnknownNameError: no recording has this name.
+    """
+    source = describe_recording(name)
+    return replace(CueTrace.from_csv(_FOLDER / name / _FILE, name=name), source=source)

@@ -97,9 +97,6 @@ def _smoothed(speed: Floats) -> Schedule:
     return Schedule(np.where(standing, 0.0, speed), np.where(standing, -HOLD, acceleration))
 
 
-# Random roads: stretches of curvature, speed limit and stops, put one after the other.
-
-
 Range = tuple[float, float]
 
 
@@ -141,6 +138,7 @@ class RoadKind:
 
 
 KMH: Final = 1.0 / 3.6
+"""One km/h in m/s."""
 
 ROLLING: Final[tuple[Range, Range]] = ((300.0, 600.0), (700.0, 1500.0))
 """Waves of an ordinary road's slope, m."""

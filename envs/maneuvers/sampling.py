@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ..car.plans import STEP, Path
-from ..car.road_roughness import RoadRoughness
-from ..car.simulation import Plan, simulate
+from ..car.simulation import Plan, RoadRoughness, simulate
 from ..car.vehicles import Car, car_names, get_car
 from ..cues import CueTrace
 from ..errors import ConfigurationError, UnknownNameError
-from ..settings import NonNegative, configuration
+from ..settings import NonNegative, check_names, check_range, configuration
 from .roads import KINDS, Road, Style, along_path, speed_limit
 
 Floats = NDArray[np.float64]
@@ -62,11 +61,8 @@ class RandomDrives:
     def __post_init__(self) -> None:
         if sum(getattr(self, kind) for kind in KINDS) <= 0.0:
             raise ValueError(f"one of {', '.join(KINDS)} must be positive")
-        if self.roughness[0] > self.roughness[1]:
-            raise ValueError(f"roughness must be a range from low to high, found {list(self.roughness)}")
-        for name in self.cars:
-            if name not in car_names():
-                raise ValueError(str(UnknownNameError("car", name, car_names())))
+        check_range("roughness", self.roughness)
+        check_names("car", self.cars, car_names())
 
     @property
     def shares(self) -> Floats:

@@ -1,22 +1,78 @@
-"""Standard maneuvers: the paper's three, open-loop steering tests, and everyday traffic."""
+"""Maneuvers: their base class, and the standard ones: the paper's, steering tests and everyday traffic."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from abc import ABC, abstractmethod
 from dataclasses import field
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..car.kernels.driver import Driver
 from ..car.plans import DT, STEP, Change, Hold, Path, Schedule, bend, clothoids, smooth_steps
-from ..car.simulation import Plan, straight
-from ..car.vehicles import Car
-from ..cues import GRAVITY
+from ..car.simulation import Plan, simulate, straight
+from ..car.vehicles import SEDAN, Car
+from ..cues import GRAVITY, CueTrace
+from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .maneuver import DEGREE, KMH, Maneuver
-from .roads import Style, along_path, speed_limit
+from .roads import KMH, Floats, Style, along_path, speed_limit
+
+DEGREE: Final = math.pi / 180.0
+"""One degree in radians."""
+
+LARGEST_OFFSET: Final = 1.0
+"""How far from its path a driver who follows one may be, m; the package's own maneuvers stay within 0.4 m."""
+
+
+@configuration
+class Maneuver(ABC):
+    """A drive of a car, from calm to calm.
+
+    Args:
+        settle: Steady straight driving (or standing) before it, s.
+        calm: The same after it, s.
+    """
+
+    name: ClassVar[str]
+    """What it is called on the command line."""
+
+    settle: Positive = 2.0
+    calm: Positive = 3.0
+
+    @abstractmethod
+    def plan(self, car: Car) -> Plan:
+        """Path, speed and, for open-loop tests, steering for this car."""
+
+    def drive(self, car: Car | None = None) -> CueTrace:
+        """Let a car (the sedan if None) drive it; 100 Hz, at the origin of F_A.
+
+        Raises:
+            ConfigurationError: the car cannot drive it: it came off its path by more than
+                :data:`LARGEST_OFFSET`. Open-loop steering tests have no path to come off.
+            DataError: the car left the range of the vehicle model.
+        """
+        plan = self.plan(car or SEDAN)
+        trace = simulate([plan])[0]
+        offset = off_path(plan, trace)
+        if offset:
+            values = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+            numbers = [
+                f"{name} {value:g}" for name, value in values.items() if isinstance(value, int | float)
+            ]
+            raise ConfigurationError(
+                f"{plan.car.name} cannot drive {self.name} with {', '.join(numbers)}: "
+                f"it came {offset:.1f} m off its path (at most {LARGEST_OFFSET:g} m); "
+                "ask for less speed or gentler bends"
+            )
+        return trace
+
+
+def off_path(plan: Plan, trace: CueTrace) -> float:
+    """Largest distance from the path, m; 0 within :data:`LARGEST_OFFSET`, and in open-loop steering tests."""
+    offset = float(np.abs(trace.channels["path_offset_m"]).max())
+    return offset if plan.steering is None and offset > LARGEST_OFFSET else 0.0
 
 
 def _late_driver() -> Driver:
@@ -118,14 +174,11 @@ class LaneChange(Maneuver):
 # Open-loop steering tests: a robot turns the wheel, the driver only keeps the speed.
 
 
-Floats = NDArray[np.float64]
-
-
 @configuration
 class StepSteer(Maneuver):
     """ISO 7401: the wheel is turned to the right at a constant rate, held, and turned back.
 
-    The angle is that of a steady turn with the wanted acceleration in the linear range, i (L / R + K a_y).
+    The angle is that of a steady turn with this acceleration in the linear range, i (L / R + K a_y).
     The standard ends with the hold; turning back is added, so that the drive ends in calm.
 
     Args:
@@ -191,9 +244,6 @@ class SineWithDwell(Maneuver):
         time = np.asarray(DT * np.arange(len(schedule)) - self.settle, dtype=np.float64)
         steering = amplitude * self.wave(time)
         return Plan(self.name, car, straight(), schedule, steering=steering)
-
-
-# Maneuvers of everyday traffic: pulling away, stop and go, a roundabout, a hill.
 
 
 @configuration

@@ -40,8 +40,8 @@ class VestibularState:
 
 
 @wp.struct
-class Sensed:
-    """What the driver senses: specific force (m/s^2, at unit static gain) and angular velocity (rad/s)."""
+class Perceived:
+    """Perceived cues: specific force (m/s^2, at unit static gain) and angular velocity (rad/s)."""
 
     force: vec3
     rate: vec3
@@ -66,20 +66,20 @@ def row(m: mat33, i: int) -> vec3:
 
 
 @wp.func
-def sense(v: Vestibular, x: VestibularState, force: vec3, rate: vec3) -> Sensed:
-    """What is sensed of the specific force and angular velocity at the head now."""
-    sensed = Sensed()
-    sensed.force = vec3(
+def perceive(v: Vestibular, x: VestibularState, force: vec3, rate: vec3) -> Perceived:
+    """Perceived cues of the specific force and angular velocity at the head now."""
+    perceived = Perceived()
+    perceived.force = vec3(
         output(v.otolith, row(x.otoliths, 0), force[0]),
         output(v.otolith, row(x.otoliths, 1), force[1]),
         output(v.otolith, row(x.otoliths, 2), force[2]),
     )
-    sensed.rate = vec3(
+    perceived.rate = vec3(
         output(v.canal_x, row(x.canals, 0), rate[0]),
         output(v.canal_y, row(x.canals, 1), rate[1]),
         output(v.canal_z, row(x.canals, 2), rate[2]),
     )
-    return sensed
+    return perceived
 
 
 @wp.func
@@ -101,7 +101,7 @@ def advance_vestibular(v: Vestibular, x: VestibularState, force: vec3, rate: vec
 
 @wp.func
 def rested(v: Vestibular, force: vec3, rate: vec3) -> VestibularState:
-    """The state in which these constant signals have been felt for ever."""
+    """The state after constant signals that have lasted for ever."""
     x = VestibularState()
     x.otoliths = wp.matrix_from_rows(
         v.otolith.rest * force[0], v.otolith.rest * force[1], v.otolith.rest * force[2]

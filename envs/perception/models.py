@@ -101,23 +101,8 @@ for _model in (
     _MODELS.register(_model.name, _model, _model.source)
 
 
-def register(
-    name: str, model: VestibularModel | str, description: str = "", *, replace: bool = False
-) -> None:
-    """Give a perception model a name, which every configuration then knows.
-
-    An installed package can do the same by an entry point of the group ``motion_cueing.vestibular_models``.
-
-    Args:
-        name: What it is called.
-        model: A model, or ``"module:attribute"`` where it is.
-        description: One line for lists.
-        replace: Whether a name that is taken is given to the new one.
-
-    Raises:
-        ConfigurationError: the name is not one word, or is taken.
-    """
-    _MODELS.register(name, model, description, replace=replace)
+register = _MODELS.register
+"""Give a perception model a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
 
 def vestibular_model_names() -> list[str]:

@@ -190,9 +190,6 @@ def check_geometry(hexapod: Hexapod) -> None:
         )
 
 
-# How far the platform goes from neutral along each axis by itself.
-
-
 _POSES: Final = 61
 """Poses looked at on the way, so that the first that is out of reach is found."""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,3 +198,36 @@ def actuator_limits(platform: Platform) -> dict[str, NDArray[np.float64]]:
     limits["position_min"][limits["position_min"] <= -UNLIMITED] = -np.inf
     limits["position_max"][limits["position_max"] >= UNLIMITED] = np.inf
     return limits
+
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class Exceeded(NamedTuple):
+    """Which actuators are beyond which limit, each (..., 9)."""
+
+    position: Flags
+    velocity: Flags
+    acceleration: Flags
+
+
+def limits_exceeded(
+    limits: Mapping[str, Floats], position: Floats, velocity: Floats, acceleration: Floats, tolerance: float
+) -> Exceeded:
+    """Hold the motion of actuators against their limits; a NaN exceeds every limit.
+
+    Args:
+        limits: As of :func:`~.parameters.actuator_limits`.
+        position: (..., 9) m and rad, in the order of ``ACTUATORS``.
+        velocity: (..., 9) m/s and rad/s.
+        acceleration: (..., 9) m/s^2 and rad/s^2.
+        tolerance: Of each limit, relative; of a position, of the whole stroke.
+    """
+    low, high = limits["position_min"], limits["position_max"]
+    slack = tolerance * (high - low)
+    return Exceeded(
+        ~((position >= low - slack) & (position <= high + slack)),
+        ~(np.abs(velocity) <= (1.0 + tolerance) * limits["velocity"]),
+        ~(np.abs(acceleration) <= (1.0 + tolerance) * limits["acceleration"]),
+    )

@@ -6,7 +6,6 @@ Figures marked (m) are class values or from the literature as remembered, not re
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any, Final
@@ -19,33 +18,12 @@ from ..settings import Vector3, load
 from .kinematics import check_geometry
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
 
-
-def _without_turntable(platform: Platform) -> Platform | None:
-    return platform.without_turntable() if platform.turntable else None
-
-
-def _without_carriage(platform: Platform) -> Platform | None:
-    return platform.without_carriage() if platform.carriage else None
-
-
-def _hexapod_only(platform: Platform) -> Platform | None:
-    if platform.turntable is None or platform.carriage is None:
-        return None
-    return platform.without_turntable().without_carriage()
-
-
-ABLATIONS: Final[Mapping[str, Callable[[Platform], Platform | None]]] = {
-    "no-turntable": _without_turntable,
-    "no-carriage": _without_carriage,
-    "hexapod-only": _hexapod_only,
+_ABLATIONS: Final = {
+    "no-turntable": (("turntable",), "its turntable locked"),
+    "no-carriage": (("carriage",), "its carriage locked"),
+    "hexapod-only": (("turntable", "carriage"), "turntable and carriage locked"),
 }
-"""What is left of a machine by the end of its name; None where it never had the subsystem."""
-
-_LEFT: Final = {
-    "no-turntable": "its turntable locked",
-    "no-carriage": "its carriage locked",
-    "hexapod-only": "turntable and carriage locked",
-}
+"""Subsystems that a machine loses, and how that is described, by the end of its name."""
 
 
 def ablations(platform: Platform) -> list[Platform]:
@@ -54,11 +32,14 @@ def ablations(platform: Platform) -> list[Platform]:
     The names are the machine's with -no-turntable, -no-carriage and -hexapod-only at the end.
     """
     found = []
-    for suffix, take in ABLATIONS.items():
-        left = take(platform)
-        if left is not None:
-            about = f"{platform.name} with {_LEFT[suffix]}"
-            found.append(replaced(left, name=f"{platform.name}-{suffix}", description=about))
+    for suffix, (parts, about) in _ABLATIONS.items():
+        if all(getattr(platform, part) is not None for part in parts):
+            locked: dict[str, Any] = dict.fromkeys(parts)
+            described: dict[str, Any] = {
+                "name": f"{platform.name}-{suffix}",
+                "description": f"{platform.name} with {about}",
+            }
+            found.append(replaced(platform, **locked, **described))
     return found
 
 
@@ -212,32 +193,11 @@ for _preset in (paper, dim_hexapod, table_24_inch, nads_1):
     _PLATFORMS.register(_platform.name, _platform, _platform.description)
 
 
-def register(
-    name: str,
-    platform: Platform | Callable[[], Platform] | str,
-    description: str = "",
-    *,
-    replace: bool = False,
-) -> None:
-    """Give a platform a name, which every command and configuration then knows.
+register = _PLATFORMS.register
+"""Give a platform, or what makes it, a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
-    An installed package can do the same by an entry point of the group ``motion_cueing.platforms``.
-
-    Args:
-        name: What it is called, in tables, too.
-        platform: A platform, a function that makes it, or ``"module:attribute"`` where either is.
-        description: One line for lists; default: the platform's own.
-        replace: Whether a name that is taken is given to the new one.
-
-    Raises:
-        ConfigurationError: the name is not one word, or is taken.
-    """
-    _PLATFORMS.register(name, platform, description, replace=replace)
-
-
-def platform_names() -> list[str]:
-    """Names of whole machines that :func:`get_platform` knows."""
-    return _PLATFORMS.names()
+platform_names = _PLATFORMS.names
+"""Names of whole machines that :func:`get_platform` knows."""
 
 
 def ablation_names() -> list[str]:
@@ -262,8 +222,7 @@ def get_platform(name: str) -> Platform:
         UnknownNameError: no platform has this name.
     """
     if name in _PLATFORMS:
-        item = _PLATFORMS[name]
-        platform: Platform = item() if callable(item) else item
+        platform: Platform = _PLATFORMS.make(name)
         return platform if platform.name == name else replaced(platform, name=name)
     ablated = _ablated()
     if name not in ablated:

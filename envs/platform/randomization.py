@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..errors import ConfigurationError
-from ..settings import Positive, Vector2, Vector3, configuration
+from ..settings import Positive, Vector2, Vector3, check_range, configuration
 from .kinematics import check_geometry
 from .machines import Carriage, Hexapod, Joints, Platform, Turntable
 
@@ -52,9 +52,7 @@ class PlatformRanges:
 
     def __post_init__(self) -> None:
         for name in ("travel", "size", "shape", "rates", "turntable_travel"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ValueError(f"{name} must be a range from low to high, found {[low, high]}")
+            check_range(name, getattr(self, name))
 
 
 def random_platform(

@@ -2,7 +2,7 @@
 
 from .drawing import RenderingUnavailableError
 from .instruments import CueHistory
-from .motion_view import MotionView
+from .machine_model import MotionView
 from .renderer import FRAMES_PER_SECOND, Renderer, append_state, motion_of
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Drawing with pygame: camera, meshes, shading, and a flat surface for shapes and text."""
+"""Drawing with pygame: camera, meshes, shading, and a flat surface for shapes and text; z points down."""
 
 from __future__ import annotations
 
@@ -35,11 +35,7 @@ def load_pygame() -> ModuleType:
 
 
 def load(module: str, package: str) -> ModuleType:
-    """A module of the extra ``render``.
-
-    Args:
-        module: What is imported.
-        package: The distribution it comes from.
+    """A module of the extra ``render``, of a package.
 
     Raises:
         RenderingUnavailableError: it is not installed.
@@ -50,9 +46,6 @@ def load(module: str, package: str) -> ModuleType:
         raise RenderingUnavailableError(
             f"rendering needs {package}: pip install 'motion-cueing-gym[render]'"
         ) from None
-
-
-# A pinhole camera in F_I (z down).
 
 
 Floats = NDArray[np.float64]
@@ -146,9 +139,6 @@ def _moved(point: Floats, other: Floats) -> Floats:
     gap = other[:, 2] - point[:, 2]
     step = np.where(point[:, 2] < NEAR, (NEAR - point[:, 2]) / np.where(gap == 0.0, 1.0, gap), 0.0)
     return np.asarray(point + step[:, None] * (other - point))
-
-
-# Meshes of quadrilaterals, and the solids a machine is made of. z points down, so "top" is the least z.
 
 
 Ints = NDArray[np.int64]
@@ -279,9 +269,6 @@ def along(direction: Floats) -> Floats:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-# Draws meshes: shaded by Lambert's law with a highlight, far faces first, what looks away left out.
-
-
 _OPAQUE: Final = 0.999
 """Faces above it hide what is behind them."""
 _INVISIBLE: Final = 0.82
@@ -410,9 +397,6 @@ def shaded(mesh: Mesh, normals: Floats, sight: Floats) -> NDArray[np.float64]:
     highlight = mesh.gloss * np.clip(np.einsum("fk,fk->f", normals, halfway), 0.0, 1.0) ** SHININESS
     light = AMBIENT + SKYLIGHT * up + DIFFUSE * lamp
     return np.asarray(mesh.colors * light[:, None] + 255.0 * highlight[:, None])
-
-
-# A flat drawing surface: shapes at twice the size, text on top at its true size, so that both are smooth.
 
 
 SUPERSAMPLING: Final = 2

@@ -13,7 +13,7 @@ from ..platform.machines import Platform
 from ..simulator.kernels.step import CueCost
 from . import theme
 from .drawing import DESIGN_HEIGHT, Canvas, Floats
-from .motion_view import MotionView, leg_use
+from .machine_model import MotionView, leg_use
 
 WINDOW: Final = 8.0
 """Seconds a chart shows."""
@@ -36,12 +36,7 @@ class CueHistory:
     """
 
     def __init__(
-        self,
-        maneuver: str,
-        policy: str,
-        dt: float,
-        window: float = WINDOW,
-        cost: CueCost | None = None,
+        self, maneuver: str, policy: str, dt: float, window: float = WINDOW, cost: CueCost | None = None
     ) -> None:
         if not (dt > 0.0 and window > dt):
             raise ConfigurationError(f"dt must be positive and below window, found {dt} and {window}")
@@ -117,10 +112,7 @@ class CueHistory:
         return rows
 
 
-# A chart of the last seconds of one cue: reference in white, simulated in color, the gap between them shaded.
-
-
-_LADDER: Final = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0)
+_RANGES: Final = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0)
 """Ranges an axis may have, in its own unit."""
 _HEADROOM: Final = 1.05
 _MOST_POINTS: Final = 160
@@ -167,7 +159,7 @@ class Box:
 def axis_range(channel: Channel, peak: float) -> float:
     """Range of the axis that holds a peak, in SI; it only grows as a drive goes on."""
     needed = max(channel.least_range, _HEADROOM * peak * channel.scale)
-    return next((step for step in _LADDER if step >= needed), needed)
+    return next((step for step in _RANGES if step >= needed), needed)
 
 
 def draw_chart(canvas: Canvas, place: Box, channel: Channel, cues: CueHistory) -> None:
@@ -220,9 +212,6 @@ def _every_nth(cues: CueHistory) -> np.ndarray:
     return np.unique(np.append(np.arange(first, count, step), count - 1))
 
 
-# Use of the travel: the carriage in plan, the heading of the turntable, six bars for the legs.
-
-
 _LABEL: Final = 11.0
 
 
@@ -244,13 +233,7 @@ def draw_gauges(canvas: Canvas, place: Box, platform: Platform, motion: MotionVi
 
 
 def _carriage(
-    canvas: Canvas,
-    x: float,
-    y: float,
-    square: float,
-    below: float,
-    platform: Platform,
-    motion: MotionView,
+    canvas: Canvas, x: float, y: float, square: float, below: float, platform: Platform, motion: MotionView
 ) -> None:
     """Travel in plan: ahead is up, right is right."""
     carriage = platform.carriage
@@ -276,13 +259,7 @@ def _carriage(
 
 
 def _turntable(
-    canvas: Canvas,
-    x: float,
-    y: float,
-    radius: float,
-    below: float,
-    platform: Platform,
-    motion: MotionView,
+    canvas: Canvas, x: float, y: float, radius: float, below: float, platform: Platform, motion: MotionView
 ) -> None:
     """The heading in plan: ahead is up, positive to the right."""
     turntable = platform.turntable
@@ -322,21 +299,13 @@ def _legs(canvas: Canvas, place: Box, below: float, platform: Platform, motion: 
     canvas.line((place.x, middle), (place.x + place.width, middle), theme.FAINT_TEXT, 0.8)
     most = motion.legs[int(np.argmax(np.abs(motion.legs)))]
     canvas.text(
-        place.x + 0.5 * place.width,
-        below,
-        f"{signed(most, 2)} m",
-        _LABEL,
-        theme.FAINT_TEXT,
-        "center",
+        place.x + 0.5 * place.width, below, f"{signed(most, 2)} m", _LABEL, theme.FAINT_TEXT, "center"
     )
 
 
 def signed(value: float, digits: int) -> str:
     """A number with its sign; what rounds to zero never flickers between +0 and −0."""
     return f"{round(float(value), digits) + 0.0:+.{digits}f}".replace("-", "−")
-
-
-# The panel beside the machine: what is driven, J so far, the cues, and the use of the machine.
 
 
 PANEL_WIDTH: Final = 400.0

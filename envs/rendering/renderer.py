@@ -16,14 +16,16 @@ from ..platform.machines import Platform
 from . import theme
 from .drawing import SUPERSAMPLING, Camera, Canvas, Mesh, Painter, load_pygame, orbit
 from .instruments import PANEL_WIDTH, CueHistory, draw_panel
-from .machine_model import Legs, MachineParts, machine_parts
-from .motion_view import (
+from .machine_model import (
     Frame,
+    Legs,
+    MachineParts,
     MotionView,
     carriage_frame,
     head,
     joints,
     leg_use,
+    machine_parts,
     neutral_view,
     platform_frame,
     turntable_frame,
@@ -50,9 +52,6 @@ def append_state(history: CueHistory, time: float, state: Any) -> None:
         for name in ("reference_cue", "simulator_cue")
     )
     history.append(time, reference, simulated)
-
-
-# The machine in its hall, in three dimensions.
 
 
 Floats = NDArray[np.float64]
@@ -132,9 +131,7 @@ class Scene:
         carriage = self._platform.carriage
         if carriage is not None:
             painter.lines(
-                *travel_lines(carriage.travel_x, carriage.travel_y, self._parts.floor),
-                theme.TRAVEL,
-                2 * unit,
+                *travel_lines(carriage.travel_x, carriage.travel_y, self._parts.floor), theme.TRAVEL, 2 * unit
             )
         self._soft_shadow(painter, motion)
         if self._parts.rails is not None and self._parts.bridge is not None:
@@ -185,9 +182,6 @@ def placed(mesh: Mesh, frame: Frame) -> Mesh:
     return replace(mesh, vertices=frame(mesh.vertices))
 
 
-# Pictures of a machine in motion, beside the cues its driver should feel and does feel.
-
-
 FRAMES_PER_SECOND: Final = 30
 """Rate at which a window shows frames, and films are made."""
 SIZE: Final = (1280, 720)
@@ -224,7 +218,8 @@ class Renderer:
         self._backdrop = _backdrop(self._pygame, self._stage.get_size())
         self._window: Any = None
         self._clock: Any = None
-        self._closed_by_user = False
+        self.closed_by_user = False
+        """Whether the user has closed the window; no other one is opened."""
 
     def frame(self, motion: MotionView, cues: CueHistory) -> Picture:
         """A frame, (height, width, 3); the same input always gives the same pixels.
@@ -246,7 +241,7 @@ class Renderer:
 
         Once the user has closed the window, frames are dropped.
         """
-        if self._closed_by_user:
+        if self.closed_by_user:
             return
         pygame: Any = self._pygame
         if self._window is None:
@@ -259,12 +254,7 @@ class Renderer:
         self._clock.tick(rate)
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
-            self._closed_by_user = True
-
-    @property
-    def closed_by_user(self) -> bool:
-        """Whether the user has closed the window; no other one is opened."""
-        return self._closed_by_user
+            self.closed_by_user = True
 
     def close(self) -> None:
         """Close the window, if there is one; frames can still be drawn."""

@@ -16,20 +16,6 @@ from numpy.typing import NDArray
 
 from . import theme
 from .drawing import Camera, Mesh, box, cap, circle, cylinder, joined, mesh, ring_walls, sphere
-from .theme import (
-    BODY,
-    DARK_STEEL,
-    GLASS,
-    HEADLIGHT,
-    INTERIOR,
-    RIM,
-    ROD,
-    SHIRT,
-    SKIN,
-    TAIL_LIGHT,
-    TYRE,
-    Color,
-)
 
 
 @dataclass(frozen=True)
@@ -80,7 +66,6 @@ _SIDE_WINDOWS: Final = (4, 6, 7, 9)
 _ROOF_FACES: Final = (0, 12)
 _WINDOW_FACES: Final = (2, 10)
 _UPPER_SIDES: Final = (3, 9)
-_HALF_RING: Final = 7
 
 _GLASS_OPACITY: Final = 0.42
 _WHEEL_RADIUS: Final = 0.29
@@ -96,14 +81,14 @@ def shell() -> Mesh:
     rings = [_ring(section) for section in _SECTIONS]
     n, last = len(rings[0]), len(rings[0]) * (len(rings) - 1)
     faces = np.concatenate([ring_walls(n, len(rings)), cap(n, 0, True), cap(n, last, False)])
-    body = mesh(np.concatenate(rings), faces, BODY, gloss=0.35)
+    body = mesh(np.concatenate(rings), faces, theme.BODY, gloss=0.35)
     body.vertices[:, 2] *= -1.0
     interval, segment = np.divmod(np.arange(n * (len(rings) - 1)), n)
     glass = np.isin(interval, (*_REAR_WINDOW, *_WINDSCREEN)) & np.isin(segment, _ROOF_FACES)
     glass |= np.isin(interval, _SIDE_WINDOWS) & np.isin(segment, _WINDOW_FACES)
-    _paint(body, glass, GLASS, gloss=0.9, opacity=_GLASS_OPACITY)
-    _paint(body, np.isin(interval, (0, 1)) & np.isin(segment, _UPPER_SIDES), TAIL_LIGHT, gloss=0.2)
-    _paint(body, np.isin(interval, (12, 13)) & np.isin(segment, _UPPER_SIDES), HEADLIGHT, gloss=0.8)
+    _paint(body, glass, theme.GLASS, gloss=0.9, opacity=_GLASS_OPACITY)
+    _paint(body, np.isin(interval, (0, 1)) & np.isin(segment, _UPPER_SIDES), theme.TAIL_LIGHT, gloss=0.2)
+    _paint(body, np.isin(interval, (12, 13)) & np.isin(segment, _UPPER_SIDES), theme.HEADLIGHT, gloss=0.8)
     return body
 
 
@@ -124,7 +109,9 @@ def _ring(section: Section) -> NDArray[np.float64]:
     return np.concatenate([right, (right * [1.0, -1.0, 1.0])[:0:-1]])
 
 
-def _paint(body: Mesh, chosen: NDArray[np.bool_], color: Color, gloss: float, opacity: float = 1.0) -> None:
+def _paint(
+    body: Mesh, chosen: NDArray[np.bool_], color: theme.Color, gloss: float, opacity: float = 1.0
+) -> None:
     faces = np.flatnonzero(chosen)
     body.colors[faces], body.gloss[faces], body.opacity[faces] = color, gloss, opacity
 
@@ -135,27 +122,27 @@ def wheels(side: float) -> tuple[Mesh, Mesh]:
     rims: list[Mesh] = []
     for x in _AXLES:
         inner, outer, cover = (np.array([x, side * y, -_WHEEL_RADIUS]) for y in (0.74, 0.86, 0.864))
-        tires.append(cylinder(inner, outer, _WHEEL_RADIUS, TYRE, sides=24))
-        rims.append(cylinder(outer, cover, 0.62 * _WHEEL_RADIUS, RIM, gloss=0.3, sides=20))
+        tires.append(cylinder(inner, outer, _WHEEL_RADIUS, theme.TYRE, sides=24))
+        rims.append(cylinder(outer, cover, 0.62 * _WHEEL_RADIUS, theme.RIM, gloss=0.3, sides=20))
     return joined(*tires), joined(*rims)
 
 
 def dashboard(driver: NDArray[np.float64]) -> Mesh:
     """The dashboard before a driver whose head is at ``driver`` (3,), from door to door."""
     x, _, z = driver
-    return box((x + 0.72, -0.74, z + 0.36), (x + 0.98, 0.74, z + 0.62), INTERIOR)
+    return box((x + 0.72, -0.74, z + 0.36), (x + 0.98, 0.74, z + 0.62), theme.INTERIOR)
 
 
 def seat(driver: NDArray[np.float64], ground: float) -> Mesh:
     """The seat's cushion under a driver whose head is at ``driver`` (3,), down to z = ``ground``."""
     x, y, z = driver
-    return box((x - 0.22, y - 0.24, z + 0.64), (x + 0.32, y + 0.24, ground), DARK_STEEL)
+    return box((x - 0.22, y - 0.24, z + 0.64), (x + 0.32, y + 0.24, ground), theme.DARK_STEEL)
 
 
 def seat_back(driver: NDArray[np.float64]) -> Mesh:
     """The seat's back behind a driver whose head is at ``driver`` (3,)."""
     x, y, z = driver
-    return box((x - 0.34, y - 0.23, z + 0.02), (x - 0.24, y + 0.23, z + 0.72), DARK_STEEL)
+    return box((x - 0.34, y - 0.23, z + 0.02), (x - 0.24, y + 0.23, z + 0.72), theme.DARK_STEEL)
 
 
 def steering_wheel(driver: NDArray[np.float64]) -> Mesh:
@@ -165,11 +152,8 @@ def steering_wheel(driver: NDArray[np.float64]) -> Mesh:
     plane = np.stack([upright, np.array([0.0, 1.0, 0.0])])
     outlines = [circle(radius, _RIM_SIDES) @ plane for radius in _RIM_RADII]
     walls = ring_walls(_RIM_SIDES, 2)
-    rim = mesh(np.concatenate(outlines), np.concatenate([walls, walls[:, ::-1]]), ROD)
+    rim = mesh(np.concatenate(outlines), np.concatenate([walls, walls[:, ::-1]]), theme.ROD)
     return rim.moved(driver + np.array([0.55, 0.0, 0.38]))
-
-
-# The driver, drawn around the point where the machine's parameters put the head.
 
 
 HEAD_RADIUS: Final = 0.115
@@ -177,18 +161,16 @@ HEAD_RADIUS: Final = 0.115
 
 
 def driver_figure(head: NDArray[np.float64]) -> Mesh:
-    """A sitting driver in the cab's frame.
-
-    Args:
-        head: (3,) middle of the head, m.
-    """
+    """A sitting driver in the cab's frame, with the middle of the head at (3,), m."""
     neck, hips = head + np.array([-0.02, 0.0, 0.12]), head + np.array([-0.10, 0.0, 0.62])
     return joined(
-        cylinder(hips, neck + np.array([-0.03, 0.0, 0.06]), 0.17, SHIRT, sides=12),
+        cylinder(hips, neck + np.array([-0.03, 0.0, 0.06]), 0.17, theme.SHIRT, sides=12),
         *(_leg(hips, side) for side in (-1.0, 1.0)),
         *(_arm(head, side) for side in (-1.0, 1.0)),
-        cylinder(neck + np.array([0.0, 0.0, 0.04]), neck - np.array([0.0, 0.0, 0.06]), 0.055, SKIN, sides=8),
-        sphere(HEAD_RADIUS, SKIN, sides=14, gloss=0.1).moved(head),
+        cylinder(
+            neck + np.array([0.0, 0.0, 0.04]), neck - np.array([0.0, 0.0, 0.06]), 0.055, theme.SKIN, sides=8
+        ),
+        sphere(HEAD_RADIUS, theme.SKIN, sides=14, gloss=0.1).moved(head),
     )
 
 
@@ -196,8 +178,8 @@ def _leg(hips: NDArray[np.float64], side: float) -> Mesh:
     knee = hips + np.array([0.48, side * 0.13, -0.10])
     foot = hips + np.array([0.88, side * 0.12, 0.16])
     return joined(
-        cylinder(hips + np.array([0.0, side * 0.09, 0.0]), knee, 0.08, DARK_STEEL, sides=8),
-        cylinder(knee, foot, 0.06, DARK_STEEL, sides=8),
+        cylinder(hips + np.array([0.0, side * 0.09, 0.0]), knee, 0.08, theme.DARK_STEEL, sides=8),
+        cylinder(knee, foot, 0.06, theme.DARK_STEEL, sides=8),
     )
 
 
@@ -205,13 +187,10 @@ def _arm(head: NDArray[np.float64], side: float) -> Mesh:
     shoulder, elbow = head + np.array([-0.05, side * 0.19, 0.24]), head + np.array([0.18, side * 0.26, 0.46])
     hand = head + np.array([0.50, side * 0.15, 0.34])
     return joined(
-        cylinder(shoulder, elbow, 0.05, SHIRT, sides=8),
-        cylinder(elbow, hand, 0.042, SHIRT, sides=8),
-        sphere(0.05, SKIN, sides=8).moved(hand),
+        cylinder(shoulder, elbow, 0.05, theme.SHIRT, sides=8),
+        cylinder(elbow, hand, 0.042, theme.SHIRT, sides=8),
+        sphere(0.05, theme.SKIN, sides=8).moved(hand),
     )
-
-
-# The floor of the hall: a grid, the border of the carriage's travel, and the machine's shadow.
 
 
 Floats = NDArray[np.float64]

@@ -109,9 +109,11 @@ class Simulator:
 
     def _upload(self) -> None:
         device, n = self.device, self.n
-        self.machines = _structs(Machine, [machine_parameters(p, self.dt) for p in self.platforms], device)
+        self.machines = wp.array(
+            [machine_parameters(p, self.dt) for p in self.platforms], dtype=Machine, device=device
+        )
         perception = [vestibular_parameters(self.vestibular, self.dt)]
-        self._perception = _structs(Vestibular, perception, device)
+        self._perception = wp.array(perception, dtype=Vestibular, device=device)
         self._drives = upload_drives(self.drives, self.dt, device)
         kinds = {"machine_of": int, "drive_of": int, "sample": int, "start": vec9, "mask": wp.bool}
         self._placing = {name: Mirror(n, kind, device) for name, kind in kinds.items()}
@@ -135,12 +137,7 @@ class Simulator:
         return wp.launch(
             step_forward,
             self.n,
-            inputs=[
-                *self.constants,
-                self._states[begin],
-                self._delays[begin],
-                self.action_array,
-            ],
+            inputs=[*self.constants, self._states[begin], self._delays[begin], self.action_array],
             outputs=[self._states[1 - begin], self._delays[1 - begin]],
             device=self.device,
             record_cmd=True,
@@ -195,10 +192,7 @@ class Simulator:
         return np.asarray(self.state["sample"] >= lengths - 1)
 
     def reset(
-        self,
-        start: ArrayLike | None = None,
-        sample: ArrayLike | None = None,
-        mask: ArrayLike | None = None,
+        self, start: ArrayLike | None = None, sample: ArrayLike | None = None, mask: ArrayLike | None = None
     ) -> NDArray[Any]:
         """Put environments at rest.
 
@@ -352,10 +346,6 @@ def upload_drives(drives: Sequence[CueTrace], dt: float, device: Any) -> Any:
     uploaded.first = wp.array(np.cumsum(lengths) - lengths, dtype=int, device=device)
     uploaded.length = wp.array(lengths, dtype=int, device=device)
     return uploaded
-
-
-def _structs(kind: Any, values: Sequence[Any], device: Any) -> Any:
-    return wp.array(list(values), dtype=kind, device=device)
 
 
 def _indices(name: str, values: ArrayLike | None, default: NDArray[Any], count: int) -> NDArray[np.int32]:

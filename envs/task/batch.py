@@ -1,4 +1,4 @@
-"""A batch of environments without an interface, on which the single, the vector and other environments run.
+"""A batch of environments and their base policy, on which the single, the vector and other environments run.
 
 Each kernel is a recorded launch with its arrays, once for each copy of the simulator's state.
 """
@@ -16,41 +16,109 @@ from ..arrays import Mirror, real, vec9
 from ..cues import CueTrace
 from ..errors import ActionError, ConfigurationError, UnknownNameError
 from ..perception.models import get_vestibular_model
+from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
 from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
-from .base import Base
-from .drives import library_of, machines_of
 from .episode import (
     DRIVE,
     MACHINE_STREAM,
     draw,
     fill_episodes,
     key_of,
+    library_of,
+    machines_of,
     pose_scale,
     start_poses,
     start_samples,
     uniform,
 )
-from .kernels.action import action_scale, action_scales
+from .kernels.action import Mode, action_scale, action_scales
 from .kernels.episode import Arrays, Command, Rules, forget, look, play
 from .kernels.observation import Episode, Layout, ability_of, layout_of, low_passed, view_of
 from .kernels.reward import reward_of, vec_terms
 from .options import TaskOptions
 
+Array = NDArray[Any]
+
+
+class Base:
+    """The base policy of a batch, with its memory.
+
+    Args:
+        policy: The policy, or None. Mode "residual" needs ``predict`` (accelerations for observations);
+            mode "gains" needs ``gain_names`` and ``schedule(observation, gains, state, episode_start)``.
+            Its state must be None or an array with one row an environment.
+        mode: What actions mean.
+        n: Environments.
+
+    Raises:
+        ConfigurationError: the mode needs another policy than there is.
+    """
+
+    def __init__(self, policy: Any, mode: Mode, n: int) -> None:
+        self.policy = policy
+        self.residual, self.scheduled = mode == "residual", mode == "gains"
+        self.action_size = len(AXES)
+        if policy is not None and not (self.residual or self.scheduled):
+            raise ConfigurationError(f"base= is of no use with action.mode {mode!r}; leave it out")
+        try:
+            if self.residual:
+                self._predict = policy.predict
+            elif self.scheduled:
+                self._schedule, self.action_size = policy.schedule, len(policy.gain_names)
+        except AttributeError:
+            method = "predict" if self.residual else "schedule"
+            raise ConfigurationError(
+                f"action.mode {mode!r} needs base=, a policy with {method}(...)"
+            ) from None
+        self._begins = np.ones(n, dtype=bool)
+        self._state: Any = None
+
+    def begin(self, mask: NDArray[np.bool_]) -> None:
+        """Episodes begin in the masked environments."""
+        self._begins |= mask
+
+    def act(
+        self, observation: Array, out: Array, gains: Array | None, mask: NDArray[np.bool_] | None
+    ) -> None:
+        """Write what the policy does at observations (n, OBSERVATION_SIZE) into ``out`` (n, 9).
+
+        Args:
+            observation: The fixed rows.
+            out: Accelerations, m/s^2 and rad/s^2.
+            gains: (n, k) for a scheduled policy.
+            mask: (n,) the environments it acts in, the others stay as they are; default: all.
+        """
+        begins = self._begins.copy()
+        if self.scheduled:
+            action, state = self._schedule(observation, gains, self._state, begins)
+        else:
+            action, state = self._predict(observation, self._state, begins, deterministic=True)
+        action = np.reshape(action, out.shape)
+        if mask is None or self._state is None or state is None:
+            out[...], self._state = action, state
+            self._begins[...] = False
+            return
+        out[mask] = action[mask]
+        self._state = np.array(self._state)
+        self._state[mask] = np.asarray(state)[mask]
+        self._begins &= ~mask
+
+    def snapshot(self) -> Snapshot:
+        """The memory, for :meth:`restore`."""
+        state = {} if self._state is None else {"base_state": np.array(self._state)}
+        return {"base_begins": self._begins.copy(), **state}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot."""
+        self._begins[...] = snapshot["base_begins"]
+        state = snapshot.get("base_state")
+        self._state = None if state is None else np.array(state)
+
+
 NOTHING, CORE, FRAME, ALL = range(4)
 """Parts of an observation, as the kernels number them."""
-
-_KINDS: Final[dict[str, Any]] = {
-    "episode": Episode,
-    "begins": wp.bool,
-    "base": vec9,
-    "command": Command,
-    "terms": vec_terms,
-    "reward": real,
-    "terminated": wp.bool,
-    "truncated": wp.bool,
-}
 
 
 class BatchArrays:
@@ -64,20 +132,16 @@ class BatchArrays:
         device: Where kernels work on them.
     """
 
-    episode: Mirror
-    begins: Mirror
-    base: Mirror
-    command: Mirror
-    terms: Mirror
-    reward: Mirror
-    terminated: Mirror
-    truncated: Mirror
-
     def __init__(
         self, n: int, action_size: int, layout: Layout, memory: NDArray[np.float32], device: Any
     ) -> None:
-        for name, kind in _KINDS.items():
-            setattr(self, name, Mirror(n, kind, device))
+        self.episode = Mirror(n, Episode, device)
+        self.begins = Mirror(n, wp.bool, device)
+        self.base = Mirror(n, vec9, device)
+        self.command = Mirror(n, Command, device)
+        self.terms = Mirror(n, vec_terms, device)
+        self.reward = Mirror(n, real, device)
+        self.terminated, self.truncated = Mirror(n, wp.bool, device), Mirror(n, wp.bool, device)
         self.action = Mirror((n, action_size), wp.float32, device)
         self.now = Mirror((n, action_size), wp.float32, device)
         self.before = Mirror((n, action_size), wp.float32, device)
@@ -301,10 +365,10 @@ class Batch:
         within = CORE if base.residual or base.scheduled else NOTHING
         for k in range(repeat):
             if base.scheduled:
-                self._ask(gains)
+                self._act(gains)
             self._launches.play(k == 0, within if k < repeat - 1 or base.residual else ALL)
             if base.residual:
-                self._ask()
+                self._act()
             yield k
         if base.residual:
             self._launches.look(False, FRAME)
@@ -314,13 +378,13 @@ class Batch:
         self._mark(begins)
         self._launches.look(True, CORE)
         if self.base.residual:
-            self._ask(mask=begins)
+            self._act(mask=begins)
         self._launches.look(True, FRAME)
         self._mark(np.zeros(self.n, dtype=bool))
 
-    def _ask(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
+    def _act(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
         """Let the base policy act."""
-        self.base.ask(self.arrays.core.pull(), self.arrays.base.view, gains, mask)
+        self.base.act(self.arrays.core.pull(), self.arrays.base.view, gains, mask)
         self.arrays.base.push()
 
     def snapshot(self) -> Snapshot:
@@ -351,9 +415,9 @@ class Batch:
         return [(name, mirror) for name, mirror in vars(self.arrays).items() if name not in _CONSTANT]
 
     @property
-    def asked(self) -> NDArray[np.float64]:
-        """(n, 9) accelerations asked of the axes in the last time step, m/s^2 and rad/s^2."""
-        return np.array(self.arrays.command.pull()["asked"], dtype=np.float64)
+    def commanded(self) -> NDArray[np.float64]:
+        """(n, 9) accelerations commanded to the axes in the last time step, m/s^2 and rad/s^2."""
+        return np.array(self.arrays.command.pull()["commanded"], dtype=np.float64)
 
     @property
     def clipped(self) -> NDArray[np.int32]:

@@ -135,10 +135,10 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
     **Observation Space.** ``Box``, float32, in fixed physical scaling: the car's cues, the cab's cues, the
     set-points of the motion base, the cues' errors and the last action; and by choice a preview, a memory,
     perceived cues, true motion and what the machine can do.
-    ``python -m motion_cueing.envs.task.observation`` prints every row.
+    :func:`~.kernels.observation.observation_table` describes every row.
 
     **Rewards.** Minus the weighted sum of terms, which ``info`` has by name: above all the cue error, whose
-    mean over a drive is J. ``python -m motion_cueing.envs.task.reward`` prints every term and its weight.
+    mean over a drive is J. :func:`~.kernels.reward.reward_table` describes every term with its weight.
 
     **Starting State.** The motion base at rest at neutral, or anywhere within ``episode.platform_offset`` of
     its travel. The car at the begin of a drive drawn from the library, or anywhere in it with

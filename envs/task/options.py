@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
-from ..errors import UnknownNameError
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..perception.models import vestibular_model_names
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, load_platform, platform_names
 from ..platform.randomization import PlatformRanges
-from ..settings import NonNegative, Positive, Vector2, configuration, renamed
+from ..settings import NonNegative, Positive, check_names, check_range, configuration, renamed
 from .kernels.action import ActionOptions
 from .kernels.observation import ObservationOptions
 from .kernels.reward import RewardOptions
@@ -21,21 +19,6 @@ from .kernels.reward import RewardOptions
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
-Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
-Frame = Literal["machine", "cab"]
-SimulatorCueSource = Literal["machine", "model"]
-
-
-def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
-    known = list(known)
-    for name in names:
-        if name not in known:
-            raise ValueError(str(UnknownNameError(kind, name, known)))
-
-
-def _check_range(name: str, limits: Vector2) -> None:
-    if limits[0] > limits[1]:
-        raise ValueError(f"{name} must be a range from low to high, found {list(limits)}")
 
 
 @configuration
@@ -65,7 +48,7 @@ class EpisodeOptions:
     terminate_on_failure: bool = False
 
     def __post_init__(self) -> None:
-        _check_names("drive", self.drives, [*maneuver_names(), *recording_names()])
+        check_names("drive", self.drives, [*maneuver_names(), *recording_names()])
         if self.random_start and self.duration is None:
             raise ValueError("random_start needs a duration, shorter than the drives")
 
@@ -99,7 +82,7 @@ class RandomizationOptions:
     def __post_init__(self) -> None:
         for name in ("friction", "natural_frequency", "dead_time"):
             if getattr(self, name) is not None:
-                _check_range(name, getattr(self, name))
+                check_range(name, getattr(self, name))
 
 
 def _from_file(platform: object) -> object:
@@ -135,5 +118,5 @@ class TaskOptions:
 
     def __post_init__(self) -> None:
         if isinstance(self.platform, str):
-            _check_names("platform", [self.platform], [*platform_names(), *ablation_names()])
-        _check_names("vestibular model", [self.vestibular], vestibular_model_names())
+            check_names("platform", [self.platform], [*platform_names(), *ablation_names()])
+        check_names("vestibular model", [self.vestibular], vestibular_model_names())

@@ -23,7 +23,7 @@ _MODES: Final = ("acceleration", "jerk", "velocity")
 
 
 class TaskUnroll:
-    """What a batch would do over a number of actions, kept so that gradients can be led back through it.
+    """What a batch would do over a number of actions, with everything that the gradients need.
 
     Forward: :meth:`begin` or :meth:`go_on`, then for each action k = 0, 1, ...: :meth:`observe`,
     :meth:`act`; and once more :meth:`observe` where the end counts. Backward, after :meth:`weigh`, from the
@@ -139,9 +139,9 @@ class TaskUnroll:
         simulator = self.batch.simulator
         wp.copy(self._states[0], simulator.state_array)
         wp.copy(self._delays[0], simulator.delay_array)
-        for kept in (self._own, self._taken):
-            last = kept[-1].numpy()
-            kept[0].assign(np.where(begins[:, None], np.zeros_like(last), last))
+        for arrays in (self._own, self._taken):
+            last = arrays[-1].numpy()
+            arrays[0].assign(np.where(begins[:, None], np.zeros_like(last), last))
         self._costs.zero_()
         self._terms.zero_()
 

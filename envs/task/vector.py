@@ -106,10 +106,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
         return normalized(acceleration, self.batch.scale)
 
     def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], Info]:
         """Begin the next episodes.
 

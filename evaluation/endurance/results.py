@@ -23,7 +23,7 @@ from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.storage import write_text
 from ...envs.task import RandomizationOptions, TaskOptions
-from ...envs.task.drives import machines_of
+from ...envs.task.episode import machines_of
 from ..reporting.text import NOTHING, TextTable, number, percent, plain_name
 from ..results import Headed, load_drives_done, save_rows
 

@@ -25,7 +25,7 @@ from ...envs.platform import Platform
 from ...envs.platform.kernels import ActuatorDynamics
 from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.simulator.kernels.observation import SCALES
-from ...envs.task.observation import ADDED
+from ...envs.task.kernels.observation import ADDED
 from ..policies import make_policy
 from ..suite import CueSource
 from .study import Condition

@@ -11,7 +11,7 @@ from motion_cueing.cli.import_log import ImportCommand, run
 from motion_cueing.cli.main import main, parse
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
-from motion_cueing.envs.logs.columns import parse_columns
+from motion_cueing.envs.logs.signals import parse_columns
 
 from ..envs.logs.synthetic_log import COLUMNS, Device, drive, write
 

@@ -21,7 +21,8 @@ from motion_cueing.envs.task import (
     TaskOptions,
 )
 from motion_cueing.envs.task.environment import normalized
-from motion_cueing.envs.task.observation import acceleration_scale, layout_of
+from motion_cueing.envs.task.kernels.action import acceleration_scale
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.evaluation import Trajectory, rollout
 
 from ..envs.task.tasks import drive

@@ -27,7 +27,7 @@ def test_it_drives_any_machine_as_in_an_environment_of_it(name):
     asked = []
     for _ in range(50):
         observation, *_ = env.step(one.predict(observation)[0])
-        asked.append(env.batch.asked[0])
+        asked.append(env.batch.commanded[0])
     assert found.platform == platform.name
     np.testing.assert_allclose(found.action[1:], asked, rtol=1e-12)
     assert np.abs(found.hexapod).max() > 1e-6

@@ -15,7 +15,7 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import legs_of_pose
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
-from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.realtime import Cues, State, make_machine

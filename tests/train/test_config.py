@@ -12,7 +12,7 @@ from motion_cueing.baselines.washout import load_washout
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.maneuvers import drive_seeds, maneuver_names, recording_names
 from motion_cueing.envs.settings import load, save
-from motion_cueing.envs.task.drives import library_of
+from motion_cueing.envs.task.episode import library_of
 from motion_cueing.train.config import (
     Choice,
     TrainingConfig,

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train import Learner
 from motion_cueing.train.agents import Network
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ...envs.errors import MotionCueingError
 from ...envs.settings import to_dict
 from ...envs.storage import write_bytes
-from ...envs.task.observation import abilities, action_scale
+from ...envs.task.kernels.action import action_scale
+from ...envs.task.kernels.observation import abilities
 from .agent import Agent
 from .network import Array
 

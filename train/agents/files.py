@@ -22,7 +22,7 @@ from ...envs.errors import ConfigurationError, DataError
 from ...envs.platform.machines import Platform
 from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
 from ...envs.storage import write_bytes
-from ...envs.task.drives import platform_of
+from ...envs.task.episode import platform_of
 from ...envs.task.options import TaskOptions
 from .names import LENGTH, METADATA
 from .network import Activation, Network, Squash

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from typing_extensions import Self
 
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
-from ...envs.interrupt import Interrupt
+from ...envs.progress import Interrupt
 
 if TYPE_CHECKING:
     from ..config import TrainingConfig

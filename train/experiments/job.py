@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from ...envs.errors import DataError, MotionCueingError
-from ...envs.interrupt import Interrupt
+from ...envs.progress import Interrupt
 from ...envs.storage import copy_file, write_text
 from ..config import TrainingConfig
 from ..logs import LOG

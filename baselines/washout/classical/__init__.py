@@ -9,8 +9,13 @@ from .family import (
     load_washout,
     washout_presets,
 )
-from .per_maneuver import PerManeuverParameters, PerManeuverWashout, load_per_maneuver, tuned_maneuvers
-from .scheduled import ScheduledWashout
+from .policies import (
+    PerManeuverParameters,
+    PerManeuverWashout,
+    ScheduledWashout,
+    load_per_maneuver,
+    tuned_maneuvers,
+)
 
 __all__ = [
     "ClassicalWashout",

@@ -14,8 +14,7 @@ from pydantic import Field
 
 from ....envs.arrays import vec3
 from ....envs.platform.machines import Cab
-from ....envs.settings import Positive, Vector2, Vector3, configuration
-from ...presets import preset_names
+from ....envs.settings import Positive, Vector2, Vector3, configuration, preset_names
 from ..families import Coordinate, Family, coordinates, load_of
 from ..kernels.blocks import HighPassParameters, Memory, Parameters, initial_memory
 from ..kernels.launch import make_kernels

@@ -20,7 +20,7 @@ from typing import Final
 
 import warp as wp
 
-from ....envs.arrays import mat33, real, vec2, vec3, vec9
+from ....envs.arrays import mat33, real, real_rows, vec2, vec3, vec9
 from ....envs.cues import GRAVITY
 from ....envs.simulator.kernels.observation import SCALES, SLICES
 from ....envs.simulator.kernels.step import State
@@ -229,19 +229,19 @@ def limited_tilt(
 
 
 @wp.func
-def triple(row: wp.array2d(dtype=real), i: int, first: int, scale: real) -> vec3:
+def triple(row: real_rows, i: int, first: int, scale: real) -> vec3:
     """Three entries of an observation in SI units."""
     return vec3(row[i, first], row[i, first + 1], row[i, first + 2]) * scale
 
 
 @wp.func
-def pair(row: wp.array2d(dtype=real), i: int, first: int, scale: real) -> vec2:
+def pair(row: real_rows, i: int, first: int, scale: real) -> vec2:
     """Two entries of an observation in SI units."""
     return vec2(row[i, first], row[i, first + 1]) * scale
 
 
 @wp.func
-def read_observation(row: wp.array2d(dtype=real), i: int) -> Reading:
+def read_observation(row: real_rows, i: int) -> Reading:
     """What the algorithm needs of an observation; see ``envs.simulator.kernels.observation``."""
     one = real(1.0)
     now = Reading()

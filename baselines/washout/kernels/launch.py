@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from ....envs.arrays import real, vec9
+from ....envs.arrays import bool_array, int_array, real, real_rows, vec9
 from ....envs.perception.kernels import Vestibular
 from ....envs.platform.kernels.step import Machine, SetPoint
 from ....envs.platform.machines import Cab
@@ -49,9 +49,9 @@ def predict_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
     @wp.kernel(enable_backward=False, module="unique")
     def predict(
         parameters: wp.array(dtype=Parameters),
-        parameters_of: wp.array(dtype=int),
-        observation: wp.array2d(dtype=real),
-        begins: wp.array(dtype=wp.bool),
+        parameters_of: int_array,
+        observation: real_rows,
+        begins: bool_array,
         memory: wp.array(dtype=Memory),
         dt: real,
         memory_out: wp.array(dtype=Memory),
@@ -81,12 +81,12 @@ def drive_kernel(Parameters: Any, begin: Any, step: Any) -> Any:
         machines: wp.array(dtype=Machine),
         vestibular: wp.array(dtype=Vestibular),
         drives: Drives,
-        machine_of: wp.array(dtype=int),
-        drive_of: wp.array(dtype=int),
+        machine_of: int_array,
+        drive_of: int_array,
         dt: real,
         delay: wp.array2d(dtype=SetPoint),
         parameters: wp.array(dtype=Parameters),
-        parameters_of: wp.array(dtype=int),
+        parameters_of: int_array,
         z: Zone,
         initial: wp.array(dtype=State),
         first: int,
@@ -123,7 +123,7 @@ def act_kernel(Parameters: Any, Memory: Any, begin: Any, step: Any) -> Any:
     @wp.kernel(enable_backward=True, module="unique")
     def act(
         parameters: wp.array(dtype=Parameters),
-        parameters_of: wp.array(dtype=int),
+        parameters_of: int_array,
         state: wp.array(dtype=State),
         memory: wp.array(dtype=Memory),
         begins: int,

@@ -142,15 +142,15 @@ def force_command(
     """
     slope = real(GRAVITY) * wp.sin(grade)
     if target.speed <= real(0.0):
-        wanted = target.acceleration_now - driver.speed_gain * wp.max(speed, real(0.0))
-        return car.mass * (wp.min(wanted, real(0.0)) - wp.abs(slope))
+        needed = target.acceleration_now - driver.speed_gain * wp.max(speed, real(0.0))
+        return car.mass * (wp.min(needed, real(0.0)) - wp.abs(slope))
     follow = driver.position_gain * wp.min(real(0.5) * target.speed, real(1.0))
-    wanted = (
+    needed = (
         target.acceleration
         + driver.speed_gain * (target.speed - speed)
         + follow * (target.position - position)
     )
-    return car.mass * (wanted + slope + car.rolling_resistance * real(GRAVITY)) + air_drag(car, speed)
+    return car.mass * (needed + slope + car.rolling_resistance * real(GRAVITY)) + air_drag(car, speed)
 
 
 @wp.func
@@ -158,11 +158,6 @@ def most_drive(car: CarParameters, speed: real) -> real:
     """Largest drive force at this speed: traction-limited, then power-limited, N."""
     return wp.min(car.max_drive_force, car.max_power / wp.max(speed, real(1.0)))
 
-
-# All cars of a batch, all time steps in one launch.
-
-
-wp.set_module_options({"enable_backward": False})
 
 SUBSTEPS = 5
 """Integration steps a sample: 2 ms, a sixth of the fastest time constant (the tires' at 40 m/s)."""
@@ -277,8 +272,7 @@ def target_at(schedule: wp.array(dtype=vec4), task: Task, sample: int, lead: int
 def pedals(car: CarParameters, force: real, speed: real) -> vec2:
     """Drive and brake force asked for, N, within what the car has."""
     return vec2(
-        wp.clamp(force, real(0.0), most_drive(car, speed)),
-        wp.clamp(-force, real(0.0), car.max_brake_force),
+        wp.clamp(force, real(0.0), most_drive(car, speed)), wp.clamp(-force, real(0.0), car.max_brake_force)
     )
 
 
@@ -345,9 +339,9 @@ def decide(
     """What the driver asks for, held for one integration step."""
     command = Commands()
     force = force_command(car, driver, state[FORWARD], station, target, slope.grade)
-    asked = pedals(car, force, state[FORWARD])
-    command.drive = asked[0]
-    command.brake = asked[1]
+    forces = pedals(car, force, state[FORWARD])
+    command.drive = forces[0]
+    command.brake = forces[1]
     command.wheel_lag = driver.hand_lag
     command.wheel = wheel
     if task.open_loop == 0:

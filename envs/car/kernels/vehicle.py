@@ -14,6 +14,8 @@ import warp as wp
 from ...arrays import mat33, real, vec2, vec3
 from ...cues import GRAVITY
 
+wp.set_module_options({"enable_backward": False})
+
 State: Any = wp.types.vector(15, real)
 """Integrated quantities of one car, by the indices below."""
 
@@ -89,11 +91,6 @@ class Forces:
     slip_rate_rear: real
 
 
-# Axle forces: Magic Formula with friction ellipse and relaxation length, valid down to standstill.
-
-
-wp.set_module_options({"enable_backward": False})
-
 _LEAST_CAPACITY = 0.05
 """Share of the friction that stays lateral when all of it is used longitudinally."""
 
@@ -154,11 +151,6 @@ def damped_slip(slip: real, along: real, across: real, low_speed: real, damping:
         result = slip - damping * weight * across
     return result
 
-
-# Equations of motion.
-
-
-wp.set_module_options({"enable_backward": False})
 
 AIR_DENSITY = 1.2
 """kg/m^3, at sea level and 20 degrees."""
@@ -340,12 +332,6 @@ def resist(car: CarParameters, deflection: real, state: State, command: Commands
     after = limited(deflection + state[FORWARD] * dt, limit)
     force = stiffness * after + car.mass * car.standstill_damping * (after - deflection) / dt
     return vec2(after, limited(force, most))
-
-
-# Cues of the car: specific force and rotation at the cab, from the model's own derivatives.
-
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct

@@ -83,16 +83,16 @@ def is_safe(q: real, v: real, q_min: real, q_max: real, acceleration: real, dt: 
 
 @wp.func
 def active_limit(
-    asked: real, q: real, v: real, q_min: real, q_max: real, velocity: real, acceleration: real, dt: real
+    requested: real, q: real, v: real, q_min: real, q_max: real, velocity: real, acceleration: real, dt: real
 ) -> int:
-    """Which limit holds back the speed ``asked`` for: 0 none, 1 end of travel, 2 velocity, 4 acceleration."""
+    """Which limit holds back a requested speed: 0 none, 1 end of travel, 2 velocity, 4 acceleration."""
     bounds = rate_bounds(q, v, q_min, q_max, velocity, acceleration, dt)
-    if asked >= bounds[0] and asked <= bounds[1]:
+    if requested >= bounds[0] and requested <= bounds[1]:
         return 0
     ahead = q_max - q
     towards = v
     bound = bounds[1]
-    if asked < bounds[0]:
+    if requested < bounds[0]:
         ahead = q - q_min
         towards = -v
         bound = -bounds[0]
@@ -101,9 +101,6 @@ def active_limit(
     if bound >= velocity:
         return 2
     return 4
-
-
-# A machine (constant) and its motion (changing).
 
 
 CARRIAGE = slice(0, 2)
@@ -164,9 +161,6 @@ class Step:
     limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
 
 
-# Lag and dead time.
-
-
 @wp.func
 def subsystem(actuator: int) -> int:
     """0 carriage, 1 hexapod, 2 turntable."""
@@ -199,9 +193,6 @@ def lag(
         + m.lag[row + 1, 4] * u_acceleration
     )
     return vec2(position, rate)
-
-
-# Singular poses: the platform does not come to rest near one, where its legs do not hold it.
 
 
 FAR_FROM_SINGULAR = wp.constant(real(0.75))
@@ -265,9 +256,6 @@ def keeps_clear(
     return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
 
 
-# The step.
-
-
 @wp.struct
 class Bounds:
     """Least and greatest speed of every actuator after a step, by :func:`~.limiter.rate_bounds`."""
@@ -283,14 +271,9 @@ def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
     upper = vec9()
     for i in range(9):
         pair = rate_bounds(
-            start.position[i],
-            start.rate[i],
-            m.position_min[i],
-            m.position_max[i],
-            m.velocity[i],
-            m.acceleration[i],
-            dt,
-        )
+            start.position[i], start.rate[i], m.position_min[i], m.position_max[i],
+            m.velocity[i], m.acceleration[i], dt,
+        )  # fmt: skip
         lower[i] = pair[0]
         upper[i] = pair[1]
     bounds = Bounds()
@@ -300,27 +283,23 @@ def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
 
 
 @wp.func
-def limit_flag(m: Machine, start: Motion, bounds: Bounds, i: int, asked: real, dt: real) -> wp.uint64:
+def limit_flag(m: Machine, start: Motion, bounds: Bounds, i: int, requested: real, dt: real) -> wp.uint64:
     """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask; none for a missing one."""
-    if (asked >= bounds.lower[i] and asked <= bounds.upper[i]) or m.position_max[i] <= m.position_min[i]:
+    if (requested >= bounds.lower[i] and requested <= bounds.upper[i]) or m.position_max[i] <= m.position_min[
+        i
+    ]:
         return wp.uint64(0)
     code = active_limit(
-        asked,
-        start.position[i],
-        start.rate[i],
-        m.position_min[i],
-        m.position_max[i],
-        m.velocity[i],
-        m.acceleration[i],
-        dt,
-    )
+        requested, start.position[i], start.rate[i], m.position_min[i], m.position_max[i],
+        m.velocity[i], m.acceleration[i], dt,
+    )  # fmt: skip
     return wp.lshift(wp.uint64(code), wp.uint64(4 * i))
 
 
 @wp.func
-def limited_rate(bounds: Bounds, i: int, asked: real) -> real:
-    """Speed of actuator ``i`` nearest the one asked for that keeps its limits."""
-    return wp.min(wp.max(asked, bounds.lower[i]), bounds.upper[i])
+def limited_rate(bounds: Bounds, i: int, requested: real) -> real:
+    """Speed of actuator ``i`` nearest the one requested for that keeps its limits."""
+    return wp.min(wp.max(requested, bounds.lower[i]), bounds.upper[i])
 
 
 @wp.func
@@ -390,7 +369,7 @@ def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rate
 
 @wp.func
 def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
-    """Legs towards their asked rates, or braking to rest where that would lead into a singular pose."""
+    """Legs towards their requested rates, or braking to rest where that would lead into a singular pose."""
     moved = legs_towards(m, start, bounds, target, rates, dt)
     s = moved.displacement
     b = moved.beta
@@ -453,17 +432,17 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
 
 @wp.func
 def command_limits(
-    m: Machine, start: Motion, bounds: Bounds, action: vec9, leg_rates_asked: vec6, clear: bool, dt: real
+    m: Machine, start: Motion, bounds: Bounds, action: vec9, requested_legs: vec6, clear: bool, dt: real
 ) -> wp.uint64:
     """Which limits a command meets, as :class:`Step`'s mask."""
     mask = wp.uint64(0)
     for i in range(9):
-        asked = start.rate[i] + action[i] * dt
+        requested = start.rate[i] + action[i] * dt
         if i >= 2 and i < 8:
-            asked = leg_rates_asked[i - 2]
+            requested = requested_legs[i - 2]
             if not clear:
                 mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
-        mask = mask | limit_flag(m, start, bounds, i, asked, dt)
+        mask = mask | limit_flag(m, start, bounds, i, requested, dt)
     return mask
 
 
@@ -473,16 +452,10 @@ def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
     linear = (after.velocity - before.velocity) / dt
     angular = (after.beta_rate - before.beta_rate) / dt
     return vec9(
-        (after.rate[0] - before.rate[0]) / dt,
-        (after.rate[1] - before.rate[1]) / dt,
-        linear[0],
-        linear[1],
-        linear[2],
-        angular[0],
-        angular[1],
-        angular[2],
+        (after.rate[0] - before.rate[0]) / dt, (after.rate[1] - before.rate[1]) / dt,
+        linear[0], linear[1], linear[2], angular[0], angular[1], angular[2],
         (after.rate[8] - before.rate[8]) / dt,
-    )
+    )  # fmt: skip
 
 
 @wp.func

@@ -14,7 +14,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ...arrays import real, vec2, vec3, vec6, vec9
+from ...arrays import int_array, real, real_rows, vec2, vec3, vec6, vec9
 from ...cues import GRAVITY
 from ...platform.kernels.step import Machine, Motion
 from .step import Cues, State
@@ -92,7 +92,7 @@ def read(observation: NDArray[Any], name: str) -> NDArray[np.float64]:
 
 
 @wp.func
-def put(out: wp.array2d(dtype=real), i: int, first: int, value: Any, size: int, scale: real) -> int:
+def put(out: real_rows, i: int, first: int, value: Any, size: int, scale: real) -> int:
     """Write the ``size`` entries of a row that begins at ``first``."""
     for k in range(size):
         out[i, first + k] = value[k] / scale
@@ -109,13 +109,7 @@ def share_of_limit(value: real, lower: real, upper: real) -> real:
 
 @wp.func
 def write_observation(
-    m: Machine,
-    s: State,
-    p: Motion,
-    acceleration: vec9,
-    cues: Cues,
-    out: wp.array2d(dtype=real),
-    i: int,
+    m: Machine, s: State, p: Motion, acceleration: vec9, cues: Cues, out: real_rows, i: int
 ) -> int:
     """One environment's observation: each row at its place in :data:`ROWS`.
 
@@ -154,10 +148,7 @@ def write_observation(
 
 
 def observe_kernel(
-    machines: wp.array(dtype=Machine),
-    machine_of: wp.array(dtype=int),
-    state: wp.array(dtype=State),
-    out: wp.array2d(dtype=real),
+    machines: wp.array(dtype=Machine), machine_of: int_array, state: wp.array(dtype=State), out: real_rows
 ) -> None:
     """Observation of every environment."""
     i = wp.tid()

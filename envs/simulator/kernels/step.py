@@ -1,4 +1,4 @@
-"""The simulator's step: state of an environment, cue cost, motion base, cues and perception.
+"""The simulator's step and its adjoint: state, cue cost, motion base, cues and perception.
 
 car cue -> policy -> **motion base -> simulator cues -> perceived cues**
 """
@@ -10,8 +10,8 @@ from typing import Any
 
 import warp as wp
 
-from ...arrays import real, vec3, vec9
-from ...perception.kernels import Sensed, Vestibular, VestibularState, advance_vestibular, rested, sense
+from ...arrays import bool_array, int_array, real, vec3, vec9
+from ...perception.kernels import Perceived, Vestibular, VestibularState, advance_vestibular, perceive, rested
 from ...platform.kernels.geometry import cab_angular_velocity, leg_extensions, specific_force
 from ...platform.kernels.step import Machine, Motion, SetPoint, actuate, command, mean_acceleration
 from ...settings import Positive, configuration
@@ -40,8 +40,8 @@ class State:
     simulator_cue: Cues
     vestibular_reference: VestibularState
     vestibular_simulator: VestibularState
-    perceived_reference: Sensed
-    perceived_simulator: Sensed
+    perceived_reference: Perceived
+    perceived_simulator: Perceived
 
 
 @wp.struct
@@ -51,11 +51,8 @@ class Drives:
     force: wp.array(dtype=vec3)
     rate: wp.array(dtype=vec3)
     rate_derivative: wp.array(dtype=vec3)
-    first: wp.array(dtype=int)  # of each drive
-    length: wp.array(dtype=int)
-
-
-# Cue cost: squared errors in units of the indifference zone.
+    first: int_array  # of each drive
+    length: int_array
 
 
 @configuration
@@ -98,13 +95,13 @@ def error(z: Zone, force: vec3, reference_force: vec3, rate: vec3, reference_rat
 
 @wp.func
 def cue_error(z: Zone, s: State) -> real:
-    """The cost of what is felt at the cab's reference point."""
+    """Cost of the cue error at the cab's reference point."""
     return error(z, s.simulator_cue.force, s.reference_cue.force, s.simulator_cue.rate, s.reference_cue.rate)
 
 
 @wp.func
 def perceived_error(z: Zone, s: State) -> real:
-    """The cost of what the driver senses."""
+    """Cost of the error of the perceived cues."""
     return error(
         z,
         s.perceived_simulator.force,
@@ -112,9 +109,6 @@ def perceived_error(z: Zone, s: State) -> real:
         s.perceived_simulator.rate,
         s.perceived_reference.rate,
     )
-
-
-# The step. One definition serves every kernel.
 
 
 @wp.func
@@ -172,10 +166,10 @@ def initial_state(m: Machine, v: Vestibular, drives: Drives, drive: int, sample:
     state.simulator_cue = simulator_cues(m, state.motion, vec9())
     state.vestibular_reference = rested(v, state.reference_cue.head_force, state.reference_cue.rate)
     state.vestibular_simulator = rested(v, state.simulator_cue.head_force, state.simulator_cue.rate)
-    state.perceived_reference = sense(
+    state.perceived_reference = perceive(
         v, state.vestibular_reference, state.reference_cue.head_force, state.reference_cue.rate
     )
-    state.perceived_simulator = sense(
+    state.perceived_simulator = perceive(
         v, state.vestibular_simulator, state.simulator_cue.head_force, state.simulator_cue.rate
     )
     return state
@@ -213,10 +207,10 @@ def next_state(
     after.vestibular_simulator = advance_vestibular(
         v, state.vestibular_simulator, state.simulator_cue.head_force, state.simulator_cue.rate
     )
-    after.perceived_reference = sense(
+    after.perceived_reference = perceive(
         v, after.vestibular_reference, after.reference_cue.head_force, after.reference_cue.rate
     )
-    after.perceived_simulator = sense(
+    after.perceived_simulator = perceive(
         v, after.vestibular_simulator, after.simulator_cue.head_force, after.simulator_cue.rate
     )
     return after
@@ -243,8 +237,8 @@ def step_kernel(
     machines: wp.array(dtype=Machine),
     vestibular: wp.array(dtype=Vestibular),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
     dt: real,
     state: wp.array(dtype=State),
     delay: wp.array2d(dtype=SetPoint),
@@ -265,11 +259,11 @@ def reset_kernel(
     machines: wp.array(dtype=Machine),
     vestibular: wp.array(dtype=Vestibular),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
-    sample: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
+    sample: int_array,
     start: wp.array(dtype=vec9),
-    mask: wp.array(dtype=wp.bool),
+    mask: bool_array,
     state_out: wp.array(dtype=State),
     delay_out: wp.array2d(dtype=SetPoint),
 ) -> None:
@@ -291,3 +285,13 @@ step_forward = wp.kernel(step_kernel, enable_backward=False, module="unique")
 
 reset_forward = wp.kernel(reset_kernel, enable_backward=False, module="unique")
 """The reset."""
+
+step_with_adjoint = wp.kernel(step_kernel, enable_backward=True, module="unique")
+"""The step with its adjoint, for gradients by Warp's tape: compiled when first used, for about a minute."""
+
+
+@wp.kernel(enable_backward=True, module="unique")
+def add_cue_error(z: Zone, state: wp.array(dtype=State), share: real, cost: wp.array(dtype=real)) -> None:
+    """Add a share of the cost of this moment, for every environment."""
+    i = wp.tid()
+    wp.atomic_add(cost, i, share * cue_error(z, state[i]))

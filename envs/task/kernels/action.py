@@ -10,12 +10,11 @@ import warp as wp
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...arrays import real, vec2, vec3, vec9
-from ...errors import UnknownNameError
+from ...arrays import float_rows, real, vec2, vec3, vec9
 from ...platform.kernels.step import AXES, Motion
 from ...platform.kinematics import neutral_jacobian
 from ...platform.machines import Platform
-from ...settings import Positive, configuration
+from ...settings import Positive, check_names, configuration
 
 Floats = NDArray[np.float64]
 Mode = Literal["acceleration", "jerk", "velocity", "residual", "gains"]
@@ -53,9 +52,7 @@ class ActionOptions:
     frame: Frame = "machine"
 
     def __post_init__(self) -> None:
-        for axis in self.frozen:
-            if axis not in AXES:
-                raise ValueError(str(UnknownNameError("axis", axis, AXES)))
+        check_names("axis", self.frozen, AXES)
 
 
 def acceleration_scale(platform: Platform) -> Floats:
@@ -197,8 +194,8 @@ def axis_rates(m: Motion) -> vec9:
 
 
 @wp.func
-def asked(mode: int, scale: AxisScale, axis: int, u: real, before: real, rate: real, dt: real) -> real:
-    """Acceleration that an entry of an action asks for; ``before`` is what was asked for a step earlier."""
+def requested(mode: int, scale: AxisScale, axis: int, u: real, before: real, rate: real, dt: real) -> real:
+    """Acceleration that an entry of an action asks for; ``before`` is that of a step earlier."""
     largest = scale.acceleration[axis]
     if mode == JERK:
         return wp.clamp(before + scale.jerk[axis] * u * dt, -largest, largest)
@@ -208,12 +205,7 @@ def asked(mode: int, scale: AxisScale, axis: int, u: real, before: real, rate: r
 
 
 @wp.func
-def take_action(
-    action: wp.array2d(dtype=wp.float32),
-    now: wp.array2d(dtype=wp.float32),
-    before: wp.array2d(dtype=wp.float32),
-    i: int,
-) -> int:
+def take_action(action: float_rows, now: float_rows, before: float_rows, i: int) -> int:
     """Keep the clipped action and the one before; returns how many entries were clipped."""
     clipped = int(0)
     for k in range(action.shape[1]):
@@ -227,18 +219,12 @@ def take_action(
 
 @wp.func
 def own_accelerations(
-    scale: ActionScale,
-    which: int,
-    m: Motion,
-    now: wp.array2d(dtype=wp.float32),
-    i: int,
-    before: vec9,
-    dt: real,
+    scale: ActionScale, which: int, m: Motion, now: float_rows, i: int, before: vec9, dt: real
 ) -> vec9:
     """The accelerations an action itself asks for in a time step, in its frame.
 
-    ``which`` is the number of the machine, ``m`` are its set-points, ``before`` is what was asked for in the
-    step before.
+    ``which`` is the number of the machine, ``m`` are its set-points, ``before`` are those of
+    the step before.
     """
     if scale.mode == GAINS:
         return vec9()
@@ -247,21 +233,21 @@ def own_accelerations(
         rates = to_cab(m, rates)
     axes = scale.axes[which]
     return vec9(
-        asked(scale.mode, axes, 0, real(now[i, 0]), before[0], rates[0], dt),
-        asked(scale.mode, axes, 1, real(now[i, 1]), before[1], rates[1], dt),
-        asked(scale.mode, axes, 2, real(now[i, 2]), before[2], rates[2], dt),
-        asked(scale.mode, axes, 3, real(now[i, 3]), before[3], rates[3], dt),
-        asked(scale.mode, axes, 4, real(now[i, 4]), before[4], rates[4], dt),
-        asked(scale.mode, axes, 5, real(now[i, 5]), before[5], rates[5], dt),
-        asked(scale.mode, axes, 6, real(now[i, 6]), before[6], rates[6], dt),
-        asked(scale.mode, axes, 7, real(now[i, 7]), before[7], rates[7], dt),
-        asked(scale.mode, axes, 8, real(now[i, 8]), before[8], rates[8], dt),
+        requested(scale.mode, axes, 0, real(now[i, 0]), before[0], rates[0], dt),
+        requested(scale.mode, axes, 1, real(now[i, 1]), before[1], rates[1], dt),
+        requested(scale.mode, axes, 2, real(now[i, 2]), before[2], rates[2], dt),
+        requested(scale.mode, axes, 3, real(now[i, 3]), before[3], rates[3], dt),
+        requested(scale.mode, axes, 4, real(now[i, 4]), before[4], rates[4], dt),
+        requested(scale.mode, axes, 5, real(now[i, 5]), before[5], rates[5], dt),
+        requested(scale.mode, axes, 6, real(now[i, 6]), before[6], rates[6], dt),
+        requested(scale.mode, axes, 7, real(now[i, 7]), before[7], rates[7], dt),
+        requested(scale.mode, axes, 8, real(now[i, 8]), before[8], rates[8], dt),
     )
 
 
 @wp.func
 def applied_accelerations(scale: ActionScale, m: Motion, own: vec9, base: vec9) -> vec9:
-    """What the axes are told: ``own`` accelerations in the machine's frame, with the base policy's."""
+    """Accelerations of the axes: the action's ``own`` in the machine's frame, with the base policy's."""
     if scale.mode == GAINS:
         return wp.cw_mul(base, scale.free)
     reference = own

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from ...arrays import real, vec9
+from ...arrays import bool_array, float_array, float_rows, int_array, real, real_rows, vec9
 from ...perception.kernels import Vestibular
 from ...platform.kernels.step import Machine, SetPoint
 from ...simulator.kernels.observation import write_observation
@@ -37,10 +37,10 @@ class Rules:
 
 @wp.struct
 class Command:
-    """What an environment's actions have asked for."""
+    """Accelerations that an environment's actions command."""
 
     own: vec9  # the accelerations of the action itself, in its frame
-    asked: vec9  # what the axes are told, with the base policy's, in the machine's frame
+    commanded: vec9  # with the base policy's, in the machine's frame
     clipped: int  # entries of the action outside [-1, 1]
 
 
@@ -49,21 +49,21 @@ class Arrays:
     """What a batch holds a row of for each environment, beside the simulator's state."""
 
     episode: wp.array(dtype=Episode)
-    begins: wp.array(dtype=wp.bool)
-    action: wp.array2d(dtype=wp.float32)
-    now: wp.array2d(dtype=wp.float32)  # the clipped action
-    before: wp.array2d(dtype=wp.float32)  # the one before
+    begins: bool_array
+    action: float_rows
+    now: float_rows  # the clipped action
+    before: float_rows  # the one before
     base: wp.array(dtype=vec9)
     command: wp.array(dtype=Command)
     terms: wp.array(dtype=vec_terms)
     reward: wp.array(dtype=real)
-    terminated: wp.array(dtype=wp.bool)
-    truncated: wp.array(dtype=wp.bool)
-    core: wp.array2d(dtype=real)
-    fixed: wp.array2d(dtype=real)  # the fixed rows in the observation's frame
-    memory: wp.array2d(dtype=wp.float32)  # low-passed cues of every sample of every drive
-    bounds: wp.array(dtype=wp.float32)  # of an observation's entries
-    observation: wp.array2d(dtype=wp.float32)
+    terminated: bool_array
+    truncated: bool_array
+    core: real_rows
+    fixed: real_rows  # the fixed rows in the observation's frame
+    memory: float_rows  # low-passed cues of every sample of every drive
+    bounds: float_array  # of an observation's entries
+    observation: float_rows
 
 
 @wp.func
@@ -73,9 +73,9 @@ def commanded(rules: Rules, a: Arrays, which: int, s: State, i: int, first: int)
     if first != 0:
         c.clipped = take_action(a.action, a.now, a.before, i)
     c.own = own_accelerations(rules.action, which, s.setpoint, a.now, i, c.own, rules.dt)
-    c.asked = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
+    c.commanded = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
     a.command[i] = c
-    return wp.cw_mul(c.asked, a.episode[i].actuator_gain)
+    return wp.cw_mul(c.commanded, a.episode[i].actuator_gain)
 
 
 @wp.func
@@ -101,15 +101,7 @@ def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> 
 
 @wp.func
 def look_at(
-    rules: Rules,
-    a: Arrays,
-    drives: Drives,
-    drive: int,
-    which: int,
-    m: Machine,
-    s: State,
-    i: int,
-    parts: int,
+    rules: Rules, a: Arrays, drives: Drives, drive: int, which: int, m: Machine, s: State, i: int, parts: int
 ) -> int:
     """Write the observation of an environment, or parts of it."""
     if parts & CORE:
@@ -118,22 +110,9 @@ def look_at(
         command = a.command[i]
         shift_frames(a.observation, i, rules.view.frame)
         write_frame(
-            rules.view,
-            drives,
-            drive,
-            a.episode[i],
-            which,
-            m,
-            s,
-            a.fixed,
-            a.now,
-            command.own,
-            a.base[i],
-            a.memory,
-            a.bounds,
-            a.observation,
-            i,
-        )
+            rules.view, drives, drive, a.episode[i], which, m, s, a.fixed,
+            a.now, command.own, a.base[i], a.memory, a.bounds, a.observation, i,
+        )  # fmt: skip
     return 0
 
 
@@ -144,8 +123,8 @@ def play(
     machines: wp.array(dtype=Machine),
     vestibular: wp.array(dtype=Vestibular),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
     first: int,
     parts: int,
     state: wp.array(dtype=State),
@@ -173,8 +152,8 @@ def look(
     a: Arrays,
     machines: wp.array(dtype=Machine),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
     only_begins: int,
     parts: int,
     state: wp.array(dtype=State),
@@ -192,7 +171,7 @@ def look(
 
 @wp.kernel(enable_backward=False, module="unique")
 def forget(a: Arrays) -> None:
-    """Nothing has been asked for where an episode begins."""
+    """Clear actions and commands where an episode begins."""
     i = wp.tid()
     if not a.begins[i]:
         return
@@ -202,9 +181,6 @@ def forget(a: Arrays) -> None:
     a.command[i] = Command()
 
 
-# With adjoints.
-
-
 @wp.kernel(enable_backward=True, module="unique")
 def play_with_adjoint(
     rules: Rules,
@@ -212,11 +188,11 @@ def play_with_adjoint(
     machines: wp.array(dtype=Machine),
     vestibular: wp.array(dtype=Vestibular),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
+    machine_of: int_array,
+    drive_of: int_array,
     first: int,
-    now: wp.array2d(dtype=wp.float32),
-    before: wp.array2d(dtype=wp.float32),
+    now: float_rows,
+    before: float_rows,
     own: wp.array(dtype=vec9),
     state: wp.array(dtype=State),
     delay: wp.array2d(dtype=SetPoint),
@@ -231,12 +207,11 @@ def play_with_adjoint(
     which = machine_of[i]
     m = machines[which]
     s = state[i]
-    asked = own_accelerations(rules.action, which, s.setpoint, now, i, own[i], rules.dt)
-    own_out[i] = asked
-    wanted = wp.cw_mul(
-        applied_accelerations(rules.action, s.setpoint, asked, vec9()), episodes[i].actuator_gain
-    )
-    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, wanted, rules.dt)
+    own_now = own_accelerations(rules.action, which, s.setpoint, now, i, own[i], rules.dt)
+    own_out[i] = own_now
+    applied = applied_accelerations(rules.action, s.setpoint, own_now, vec9())
+    commanded = wp.cw_mul(applied, episodes[i].actuator_gain)
+    after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, commanded, rules.dt)
     if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
@@ -253,32 +228,19 @@ def look_with_adjoint(
     episodes: wp.array(dtype=Episode),
     machines: wp.array(dtype=Machine),
     drives: Drives,
-    machine_of: wp.array(dtype=int),
-    drive_of: wp.array(dtype=int),
-    memory: wp.array2d(dtype=wp.float32),
-    bounds: wp.array(dtype=wp.float32),
-    now: wp.array2d(dtype=wp.float32),
+    machine_of: int_array,
+    drive_of: int_array,
+    memory: float_rows,
+    bounds: float_array,
+    now: float_rows,
     own: wp.array(dtype=vec9),
     state: wp.array(dtype=State),
-    fixed: wp.array2d(dtype=real),
-    out: wp.array2d(dtype=wp.float32),
+    fixed: real_rows,
+    out: float_rows,
 ) -> None:
     """Observations before an action; ``now`` is the last one."""
     i = wp.tid()
     write_frame(
-        rules.view,
-        drives,
-        drive_of[i],
-        episodes[i],
-        machine_of[i],
-        machines[machine_of[i]],
-        state[i],
-        fixed,
-        now,
-        own[i],
-        vec9(),
-        memory,
-        bounds,
-        out,
-        i,
-    )
+        rules.view, drives, drive_of[i], episodes[i], machine_of[i], machines[machine_of[i]], state[i], fixed,
+        now, own[i], vec9(), memory, bounds, out, i,
+    )  # fmt: skip

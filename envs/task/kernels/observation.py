@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.signal import lfilter
 
-from ...arrays import real, vec2, vec3, vec9
+from ...arrays import float_array, float_rows, real, real_rows, vec2, vec3, vec9
 from ...cues import GRAVITY, CueTrace
 from ...platform.kernels.step import Machine, Motion
 from ...platform.kinematics import axis_reach
@@ -177,11 +177,11 @@ ADDED: Final = (
             3,
             10.0,
             "m/s^2",
-            "`observation.perceived`: specific force sensed in the car",
+            "`observation.perceived`: specific force perceived in the car",
         ),
-        Row("perceived_reference_rate", 3, 1.0, "rad/s", "angular velocity sensed in the car"),
-        Row("perceived_simulator_force", 3, 10.0, "m/s^2", "specific force sensed in the cab"),
-        Row("perceived_simulator_rate", 3, 1.0, "rad/s", "angular velocity sensed in the cab"),
+        Row("perceived_reference_rate", 3, 1.0, "rad/s", "angular velocity perceived in the car"),
+        Row("perceived_simulator_force", 3, 10.0, "m/s^2", "specific force perceived in the cab"),
+        Row("perceived_simulator_rate", 3, 1.0, "rad/s", "angular velocity perceived in the cab"),
     ),
     *_added(
         lambda seen, mode, action: seen.true_motion,
@@ -271,9 +271,6 @@ def observation_table() -> str:
     return "\n".join(lines)
 
 
-# Memory: the car's cues through first-order low-passes.
-
-
 def low_passed(drives: Sequence[CueTrace], time_constants: Sequence[float], dt: float) -> NDArray[np.float32]:
     """(samples of all drives, 6 per time constant) cues through 1 / (T s + 1), scaled as the observation's.
 
@@ -292,9 +289,6 @@ def _of_drive(drive: CueTrace, time_constants: Sequence[float], dt: float) -> ND
         filtered, _ = lfilter([1.0 - p], [1.0, -p], cues, axis=0, zi=p * cues[:1])
         columns.append(filtered)
     return np.hstack(columns)
-
-
-# Abilities of a machine.
 
 
 _TURN: Final = 2.0 * np.pi
@@ -356,9 +350,6 @@ class Episode:
     actuator_gain: vec9
 
 
-# The rows in a kernel.
-
-
 Firsts: Any = wp.struct(
     type("Firsts", (), {"__module__": __name__, "__annotations__": {added.row.name: int for added in ADDED}})
 )
@@ -377,7 +368,7 @@ class View:
     modeled: int  # whether the cab's cues are those of the set-points
     force_noise: real  # m/s^2
     rate_noise: real  # rad/s
-    abilities: wp.array2d(dtype=wp.float32)  # what each machine can do, the constant rows
+    abilities: float_rows  # what each machine can do, the constant rows
 
 
 def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[float, float]) -> Any:
@@ -401,9 +392,7 @@ def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[fl
 
 
 @wp.func
-def put_entry(
-    out: wp.array2d(dtype=wp.float32), i: int, k: int, value: real, bounds: wp.array(dtype=wp.float32)
-) -> int:
+def put_entry(out: float_rows, i: int, k: int, value: real, bounds: float_array) -> int:
     """Write an entry, clipped to its bound."""
     # Once only: an entry that is written twice would count twice in the adjoint.
     out[i, k] = wp.clamp(wp.float32(value), -bounds[k], bounds[k])
@@ -412,13 +401,7 @@ def put_entry(
 
 @wp.func
 def put_vector(
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
-    first: int,
-    value: Any,
-    size: int,
-    scale: real,
-    bounds: wp.array(dtype=wp.float32),
+    out: float_rows, i: int, first: int, value: Any, size: int, scale: real, bounds: float_array
 ) -> int:
     """Write the ``size`` entries of a row that begins at ``first``."""
     for k in range(size):
@@ -433,17 +416,11 @@ def lifted(force: vec3) -> vec3:
 
 
 @wp.func
-def put_sensed(
-    v: View,
-    e: Episode,
-    sample: int,
-    fixed: wp.array2d(dtype=real),
-    bounds: wp.array(dtype=wp.float32),
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
+def put_measured(
+    v: View, e: Episode, sample: int, fixed: real_rows, bounds: float_array, out: float_rows, i: int
 ) -> int:
     """Write the simulator's rows, the cab's cues with the errors of its sensors, and the cues' errors."""
-    # A generator of its own for each sample: what is seen does not depend on how often it is looked at.
+    # A generator of its own for each sample: an observation does not depend on how often it is made.
     random = wp.rand_init(e.noise, sample)
     noisy = v.force_noise + v.rate_noise > real(0.0) and v.modeled == 0
     force_gain = real(1.0)
@@ -478,13 +455,7 @@ def put_sensed(
 
 @wp.func
 def put_preview(
-    v: View,
-    drives: Drives,
-    drive: int,
-    sample: int,
-    bounds: wp.array(dtype=wp.float32),
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
+    v: View, drives: Drives, drive: int, sample: int, bounds: float_array, out: float_rows, i: int
 ) -> int:
     """Write the car's cues ahead, the last one of the drive after its end."""
     first = drives.first[drive]
@@ -498,9 +469,7 @@ def put_preview(
 
 
 @wp.func
-def put_perceived(
-    f: Firsts, s: State, bounds: wp.array(dtype=wp.float32), out: wp.array2d(dtype=wp.float32), i: int
-) -> int:
+def put_perceived(f: Firsts, s: State, bounds: float_array, out: float_rows, i: int) -> int:
     """Write the perceived cues."""
     car = s.perceived_reference
     cab = s.perceived_simulator
@@ -516,9 +485,7 @@ def put_perceived(
 
 
 @wp.func
-def put_true_motion(
-    f: Firsts, m: Motion, bounds: wp.array(dtype=wp.float32), out: wp.array2d(dtype=wp.float32), i: int
-) -> int:
+def put_true_motion(f: Firsts, m: Motion, bounds: float_array, out: float_rows, i: int) -> int:
     """Write the true motion."""
     turntable = vec2(wp.sin(m.position[8]), wp.cos(m.position[8]))
     put_vector(out, i, f.true_carriage, m.position, 2, wp.static(UNIT["true_carriage"]), bounds)
@@ -534,13 +501,7 @@ def put_true_motion(
 
 @wp.func
 def put_machine(
-    v: View,
-    which: int,
-    m: Machine,
-    setpoint: Motion,
-    bounds: wp.array(dtype=wp.float32),
-    out: wp.array2d(dtype=wp.float32),
-    i: int,
+    v: View, which: int, m: Machine, setpoint: Motion, bounds: float_array, out: float_rows, i: int
 ) -> int:
     """Write what the machine can do, constants of the batch, and the shares of travel it uses."""
     for k in range(v.abilities.shape[1]):
@@ -560,7 +521,7 @@ def put_machine(
 
 
 @wp.func
-def shift_frames(out: wp.array2d(dtype=wp.float32), i: int, frame: int) -> int:
+def shift_frames(out: float_rows, i: int, frame: int) -> int:
     """Make room for a new frame before the older ones."""
     size = out.shape[1]
     for k in range(size - frame):
@@ -569,7 +530,7 @@ def shift_frames(out: wp.array2d(dtype=wp.float32), i: int, frame: int) -> int:
 
 
 @wp.func
-def repeat_frame(out: wp.array2d(dtype=wp.float32), i: int, frame: int) -> int:
+def repeat_frame(out: float_rows, i: int, frame: int) -> int:
     """Fill the older frames with the newest."""
     for k in range(out.shape[1] - frame):
         out[i, frame + k] = out[i, k]
@@ -617,13 +578,13 @@ def write_frame(
     which: int,
     machine: Machine,
     s: State,
-    fixed: wp.array2d(dtype=real),
-    now: wp.array2d(dtype=wp.float32),
+    fixed: real_rows,
+    now: float_rows,
     command: vec9,
     base: vec9,
-    memory: wp.array2d(dtype=wp.float32),
-    bounds: wp.array(dtype=wp.float32),
-    out: wp.array2d(dtype=wp.float32),
+    memory: float_rows,
+    bounds: float_array,
+    out: float_rows,
     i: int,
 ) -> int:
     """Write the newest frame of an environment's observation, each row that is there.
@@ -634,7 +595,7 @@ def write_frame(
     acceleration = axes_in_view(v, s.setpoint, acceleration_in_view(v, s))
     motion = motion_in_view(v, s.setpoint)
     write_observation(machine, s, motion, acceleration, cues_in_view(v, machine, s), fixed, i)
-    put_sensed(v, e, s.sample, fixed, bounds, out, i)
+    put_measured(v, e, s.sample, fixed, bounds, out, i)
     for k in range(now.shape[1]):
         put_entry(out, i, f.last_action + k, real(now[i, k]), bounds)
     if f.command >= 0:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import warp as wp
 from pydantic import Field
 
-from ...arrays import real, vec3
+from ...arrays import float_rows, real, vec3
 from ...cues import GRAVITY
 from ...platform.kernels.step import END_OF_TRAVEL, SINGULAR, Machine
 from ...platform.machines import UNLIMITED
@@ -168,7 +168,7 @@ def limits(r: RewardScale, m: Machine, s: State) -> real:
 
 @term(weight=0.02, of="action")
 @wp.func
-def action_rate(now: wp.array2d(dtype=wp.float32), before: wp.array2d(dtype=wp.float32), i: int) -> real:
+def action_rate(now: float_rows, before: float_rows, i: int) -> real:
     """Mean square change of the action."""
     total = real(0.0)
     for k in range(now.shape[1]):
@@ -281,9 +281,7 @@ def state_terms(r: RewardScale, m: Machine, s: State, share: real) -> vec_terms:
 
 
 @wp.func
-def action_terms(
-    now: wp.array2d(dtype=wp.float32), before: wp.array2d(dtype=wp.float32), i: int
-) -> vec_terms:
+def action_terms(now: float_rows, before: float_rows, i: int) -> vec_terms:
     """The terms that belong to the action and count once."""
     terms = vec_terms()
     for k in range(wp.static(len(_ACTION))):

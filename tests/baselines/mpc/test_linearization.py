@@ -7,7 +7,7 @@ import pytest
 
 from motion_cueing.baselines.mpc import Margins
 from motion_cueing.baselines.mpc.prediction import N_CUES, MachineModel, cue_scales
-from motion_cueing.baselines.mpc.problem import moving_axes
+from motion_cueing.baselines.mpc.solver import moving_axes
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.simulator.simulator import TIME_STEP, Simulator

@@ -10,8 +10,7 @@ from scipy.optimize import nnls
 
 from motion_cueing.baselines.mpc import solver as solver_module
 from motion_cueing.baselines.mpc.prediction import N_CUES, Linearization, cue_scales, make_grid
-from motion_cueing.baselines.mpc.problem import Bounds, HorizonProgram, Motion
-from motion_cueing.baselines.mpc.solver import QpSolution, solve
+from motion_cueing.baselines.mpc.solver import Bounds, HorizonProgram, Motion, QpSolution, solve
 
 from .machines import PAPER, quick
 

@@ -10,9 +10,9 @@ import pytest
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
 from motion_cueing.baselines.optimum.plan import Plan, PlanReport, key_of, load_plan, plans_folder, store_plan
 from motion_cueing.baselines.optimum.windows import Planner
-from motion_cueing.baselines.presets import cache_folder
 from motion_cueing.envs.perception import get_vestibular_model
 from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.storage import cache_folder
 
 from .drives import surge
 

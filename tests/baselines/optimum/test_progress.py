@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 
 import pytest
 
 from motion_cueing.baselines.optimum import Optimum, OptimumOptions
 from motion_cueing.baselines.optimum import policy as module
-from motion_cueing.baselines.optimum.policy import SolveProgress
+from motion_cueing.baselines.optimum.policy import solve_progress
 
 from .drives import surge
 
@@ -32,18 +33,20 @@ def test_a_long_solve_shows_how_far_it_is(monkeypatch):
     monkeypatch.setattr(module, "_PATIENCE", 0.0)
     Optimum(options=OptimumOptions(effort=1e-3), cached=False).plan(surge(0.5, 1.0))
     assert "optimum: surge" in terminal.getvalue()
-    assert "iteration 3" in terminal.getvalue()
+    assert re.search(r"iteration \d", terminal.getvalue())
 
 
 def test_a_short_one_shows_nothing(monkeypatch):
     terminal = on_terminal(monkeypatch)
-    with SolveProgress("drive") as shown:
-        shown.on_window(0.0, 1)
+    with solve_progress("drive") as on_window:
+        on_window(0.0, 1)
     assert terminal.getvalue() == ""
 
 
-def test_where_it_is_not_wanted_nobody_is_told(monkeypatch):
+def test_nothing_is_shown_in_a_command_with_its_own_bar_or_without_a_terminal(monkeypatch):
     on_terminal(monkeypatch)
-    assert SolveProgress("drive", enabled=False).on_window is None
+    with solve_progress("drive", enabled=False) as on_window:
+        assert on_window is None
     monkeypatch.setattr(sys, "stderr", io.StringIO())
-    assert SolveProgress("drive").on_window is None
+    with solve_progress("drive") as on_window:
+        assert on_window is None

@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 
 from motion_cueing.baselines.tuning import methods as evolution
 from motion_cueing.baselines.tuning import methods as method
+from motion_cueing.baselines.tuning import objective as space_module
 from motion_cueing.baselines.tuning import search as search_module
-from motion_cueing.baselines.tuning import space as space_module
 from motion_cueing.baselines.tuning.methods import CmaEs, GradientDescent, StepResult, place_gradient
-from motion_cueing.baselines.tuning.objective import LIMIT_STEP, Objective, penalty
+from motion_cueing.baselines.tuning.objective import LIMIT_STEP, Objective, WashoutSpace, penalty
 from motion_cueing.baselines.tuning.search import Record, Search, TuningOptions, load_record
-from motion_cueing.baselines.tuning.space import WashoutSpace
 from motion_cueing.baselines.washout import (
     FAMILIES,
     Coordinate,

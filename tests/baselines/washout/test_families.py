@@ -11,8 +11,8 @@ import pytest
 
 from motion_cueing.baselines import make_policy, policy_names
 from motion_cueing.baselines.registry import POLICIES
+from motion_cueing.baselines.tuning.objective import WashoutSpace
 from motion_cueing.baselines.tuning.search import TuningOptions
-from motion_cueing.baselines.tuning.space import WashoutSpace
 from motion_cueing.baselines.washout import WashoutParameters
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.baselines.washout.families import (

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg, signal
 
-from motion_cueing.baselines.tuning.space import WashoutSpace
+from motion_cueing.baselines.tuning.objective import WashoutSpace
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.baselines.washout.families import load_of
 from motion_cueing.baselines.washout.optimal import (

@@ -11,8 +11,8 @@ import pytest
 from motion_cueing.baselines import make_policy
 from motion_cueing.baselines.washout import PerManeuverWashout, load_washout
 from motion_cueing.baselines.washout.batch import WashoutBatch
-from motion_cueing.baselines.washout.classical import per_maneuver
-from motion_cueing.baselines.washout.classical.per_maneuver import load_per_maneuver, tuned_maneuvers
+from motion_cueing.baselines.washout.classical import policies as per_maneuver
+from motion_cueing.baselines.washout.classical.policies import load_per_maneuver, tuned_maneuvers
 from motion_cueing.envs.errors import UnknownNameError
 from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform

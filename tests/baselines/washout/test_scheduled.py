@@ -10,7 +10,7 @@ import pytest
 
 from motion_cueing.baselines.washout import ClassicalWashout, load_washout
 from motion_cueing.baselines.washout.classical.family import LowPass
-from motion_cueing.baselines.washout.classical.scheduled import KNOBS, ScheduledWashout
+from motion_cueing.baselines.washout.classical.policies import KNOBS, ScheduledWashout
 from motion_cueing.envs.errors import ActionError, ConfigurationError, DataError
 from motion_cueing.envs.simulator.kernels.observation import OBSERVATION_SIZE
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import csd, welch
 
 from motion_cueing.envs.car import get_car
-from motion_cueing.envs.car.road_roughness import SPACING, RoadRoughness, _sprung, shaking
+from motion_cueing.envs.car.simulation import SPACING, RoadRoughness, _sprung, shaking
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.maneuvers import RandomDrives, random_drive, random_drives

@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, MotionCueingError
-from motion_cueing.envs.logs.columns import ImportOptions
 from motion_cueing.envs.logs.importer import ImportedLog, import_log
 from motion_cueing.envs.logs.mounting import Mounting, level
-from motion_cueing.envs.logs.timing import low_pass
+from motion_cueing.envs.logs.signals import ImportOptions, low_pass
 
 from .synthetic_log import COLUMNS, WITH_COURSE, Device, Floats, Truth, drive, rotation, write
 

@@ -17,8 +17,14 @@ from motion_cueing.envs.maneuvers.cones import (
     clearance,
     smoothest_way,
 )
-from motion_cueing.envs.maneuvers.maneuver import DEGREE, KMH, LARGEST_OFFSET, Maneuver
-from motion_cueing.envs.maneuvers.standard import SineWithDwell, SteadyTurn
+from motion_cueing.envs.maneuvers.standard import (
+    DEGREE,
+    KMH,
+    LARGEST_OFFSET,
+    Maneuver,
+    SineWithDwell,
+    SteadyTurn,
+)
 from motion_cueing.envs.settings import from_dict, load, save
 
 from ..car.gains import roll_gradient

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-import motion_cueing.envs.maneuvers.recordings as recordings
+import motion_cueing.envs.maneuvers.registry as recordings
 from motion_cueing.envs.errors import UnknownNameError
-from motion_cueing.envs.maneuvers.recordings import get_recording, recording_names
+from motion_cueing.envs.maneuvers.registry import get_recording, recording_names
 
 NAMES = ["city-drive", "commute"]
 TURNS = [(22.0, 32.0, 77.1), (62.0, 68.0, 85.3), (140.0, 152.0, -92.9), (190.0, 202.0, -82.6)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.platform import actuator_limits, get_platform, platform_names
-from motion_cueing.envs.platform.limits import limits_exceeded
+from motion_cueing.envs.platform.machines import limits_exceeded
 
 TOLERANCE = 1e-6
 

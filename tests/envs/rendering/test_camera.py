@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.rendering.drawing import NEAR, Camera, clip_near, clip_segments, load_pygame, orbit
-from motion_cueing.envs.rendering.motion_view import joints
+from motion_cueing.envs.rendering.machine_model import joints
 from motion_cueing.envs.rendering.renderer import Scene
 
 from .moments import moment

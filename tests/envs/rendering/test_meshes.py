@@ -18,8 +18,7 @@ from motion_cueing.envs.rendering.drawing import (
     shaded,
     sphere,
 )
-from motion_cueing.envs.rendering.machine_model import Legs, machine_parts, tubes
-from motion_cueing.envs.rendering.motion_view import joints, leg_use
+from motion_cueing.envs.rendering.machine_model import Legs, joints, leg_use, machine_parts, tubes
 from motion_cueing.envs.rendering.surroundings import shell
 
 from .moments import moment

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.platform import get_platform, legs_of_pose, platform_names
-from motion_cueing.envs.rendering.motion_view import (
+from motion_cueing.envs.rendering.machine_model import (
     MotionView,
     head,
     joints,

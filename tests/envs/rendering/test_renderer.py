@@ -14,7 +14,7 @@ from motion_cueing.envs.platform import Platform, get_platform, platform_names
 from motion_cueing.envs.rendering import CueHistory, Renderer, RenderingUnavailableError, theme
 from motion_cueing.envs.rendering.drawing import load
 from motion_cueing.envs.rendering.instruments import CHANNELS, PANEL_WIDTH, axis_range, shortened, signed
-from motion_cueing.envs.rendering.motion_view import head
+from motion_cueing.envs.rendering.machine_model import head
 from motion_cueing.envs.rendering.renderer import Scene
 
 from .moments import SIZE, moment, weaving
@@ -169,7 +169,7 @@ def test_a_frame_needs_no_display_and_prints_nothing():
     code = (
         "from motion_cueing.envs.platform import get_platform\n"
         "from motion_cueing.envs.rendering import CueHistory, Renderer\n"
-        "from motion_cueing.envs.rendering.motion_view import neutral_view\n"
+        "from motion_cueing.envs.rendering.machine_model import neutral_view\n"
         "import pygame\n"
         "renderer, cues = Renderer(get_platform('paper'), (640, 360)), CueHistory('m', 'p', 0.01)\n"
         "frame = renderer.frame(neutral_view(), cues)\n"

@@ -15,8 +15,7 @@ from motion_cueing.envs.arrays import FLOAT, real, vec9
 from motion_cueing.envs.platform import Platform, get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.platform.kernels.step import SetPoint
-from motion_cueing.envs.simulator.kernels.gradient import add_cue_error, step_with_adjoint
-from motion_cueing.envs.simulator.kernels.step import CueCost, State, zone
+from motion_cueing.envs.simulator.kernels.step import CueCost, State, add_cue_error, step_with_adjoint, zone
 from motion_cueing.envs.simulator.simulator import Simulator
 
 STEPS, BATCH = 200, 2

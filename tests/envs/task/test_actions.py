@@ -10,7 +10,7 @@ from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.platform.kernels.step import AXES
 from motion_cueing.envs.platform.kinematics import legs_of_pose
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator, RandomizationOptions
-from motion_cueing.envs.task.observation import acceleration_scale, velocity_scale
+from motion_cueing.envs.task.kernels.action import acceleration_scale, velocity_scale
 
 from .tasks import drive
 

@@ -15,8 +15,7 @@ from motion_cueing.envs.task import (
     EpisodeOptions,
     RandomizationOptions,
 )
-from motion_cueing.envs.task.drives import library_of
-from motion_cueing.envs.task.episode import draw, key_of, pose_scale, start_poses, uniform, words
+from motion_cueing.envs.task.episode import draw, key_of, library_of, pose_scale, start_poses, uniform, words
 
 from .tasks import drive
 

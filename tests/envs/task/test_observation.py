@@ -270,7 +270,7 @@ sys.meta_path.insert(0, Changed())
 import numpy as np
 from motion_cueing.envs.task import DrivingSimulator
 from motion_cueing.envs.task.kernels import observation as layout_page
-from motion_cueing.envs.task.observation import observation_table
+from motion_cueing.envs.task.kernels.observation import observation_table
 
 env = DrivingSimulator(episode={"library": 1, "drive_duration": 2.0})
 plain, _ = env.reset(seed=0)

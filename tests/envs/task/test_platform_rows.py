@@ -16,7 +16,8 @@ from motion_cueing.envs.task import (
     TaskOptions,
 )
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.observation import MACHINE, acceleration_scale, velocity_scale
+from motion_cueing.envs.task.kernels.action import acceleration_scale, velocity_scale
+from motion_cueing.envs.task.kernels.observation import MACHINE
 from motion_cueing.envs.task.unroll import TaskUnroll
 
 from .tasks import drive
@@ -137,7 +138,7 @@ def test_each_environment_is_the_one_of_its_machine_bit_for_bit(mode):
         for i, one in enumerate(alone):
             one.write(action[i : i + 1])
             one.step()
-            np.testing.assert_array_equal(many.asked[i], one.asked[0])
+            np.testing.assert_array_equal(many.commanded[i], one.commanded[0])
             np.testing.assert_array_equal(many.arrays.observation.pull()[i], one.arrays.observation.pull()[0])
             assert many.arrays.reward.pull()[i] == one.arrays.reward.pull()[0]
 
@@ -173,7 +174,7 @@ def test_largest_is_the_same_on_every_machine_that_has_the_axis():
     np.testing.assert_allclose(batch.scale, np.where(has, 0.01 * np.array(largest), 0.0), rtol=1e-12)
     batch.write(np.full((N, 9), 0.5))
     batch.step()
-    np.testing.assert_allclose(batch.asked, 0.5 * batch.scale, rtol=1e-6)
+    np.testing.assert_allclose(batch.commanded, 0.5 * batch.scale, rtol=1e-6)
     with pytest.raises(ConfigurationError, match="largest"):
         task(action={"largest": (1.0, 2.0)})
 

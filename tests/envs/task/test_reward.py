@@ -12,7 +12,7 @@ import pytest
 
 from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions, RewardOptions, RewardWeights
 from motion_cueing.envs.task.kernels import reward as reward_page
-from motion_cueing.envs.task.reward import TERMS
+from motion_cueing.envs.task.kernels.reward import DECLARED, TERMS
 from motion_cueing.evaluation.metrics import Criteria, beyond, false_cues
 
 from .tasks import drive
@@ -117,7 +117,7 @@ class Changed:
 sys.meta_path.insert(0, Changed())
 import numpy as np
 from motion_cueing.envs.task import DrivingSimulator, RewardWeights
-from motion_cueing.envs.task.reward import TERMS, reward_table
+from motion_cueing.envs.task.kernels.reward import TERMS, reward_table
 
 assert TERMS[4:6] == ("height", "stroke")
 assert "| `height` | 3 | Depth of the cab, m. |" in reward_table()

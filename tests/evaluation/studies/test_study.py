@@ -11,8 +11,8 @@ import pytest
 from rich.console import Console
 
 from motion_cueing.baselines.washout import load_washout
-from motion_cueing.baselines.washout.classical import per_maneuver
-from motion_cueing.baselines.washout.classical.per_maneuver import PerManeuverWashout, load_per_maneuver
+from motion_cueing.baselines.washout.classical import policies as per_maneuver
+from motion_cueing.baselines.washout.classical.policies import PerManeuverWashout, load_per_maneuver
 from motion_cueing.cli.studies import results_of
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.errors import ConfigurationError, DataError

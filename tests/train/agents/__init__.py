@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from motion_cueing.baselines.registry import POLICIES
-from motion_cueing.baselines.washout.classical.scheduled import KNOBS
+from motion_cueing.baselines.washout.classical.policies import KNOBS
 from motion_cueing.envs.task import TaskOptions
-from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train.agents import Agent, Network, Record, names, register_agents
 
 RECORD = Record(

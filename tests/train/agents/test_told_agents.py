@@ -14,8 +14,9 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import get_platform, platform_names
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.envs.task.batch import Batch
-from motion_cueing.envs.task.drives import machines_of
-from motion_cueing.envs.task.observation import MACHINE, abilities, ability_of, acceleration_scale
+from motion_cueing.envs.task.episode import machines_of
+from motion_cueing.envs.task.kernels.action import acceleration_scale
+from motion_cueing.envs.task.kernels.observation import MACHINE, abilities, ability_of
 from motion_cueing.train.agents.export import export_onnx
 from motion_cueing.train.algorithms.apg.apg import ApgLearner
 from motion_cueing.train.algorithms.dagger.dagger import Teacher

@@ -35,7 +35,7 @@ from ....envs.platform.kernels.step import AXES
 from ....envs.settings import Positive, configuration, from_dict
 from ....envs.simulator.kernels.observation import SCALES
 from ....envs.task.batch import Batch
-from ....envs.task.observation import Layout
+from ....envs.task.kernels.observation import Layout
 from ....envs.task.options import PositiveCount
 from ...agents import Network
 from ...config import TrainingConfig

@@ -90,7 +90,7 @@ def test_actions_in_the_cabs_frame_ask_for_the_teachers_accelerations(seed):
     wanted = 0.5 * batch.scale * rng.uniform(-1.0, 1.0, size=(2, 9))
     batch.write(teacher._as_actions(wanted))
     batch.step()
-    np.testing.assert_allclose(batch.asked, wanted, atol=1e-5)
+    np.testing.assert_allclose(batch.commanded, wanted, atol=1e-5)
 
 
 def test_one_that_is_told_the_drive_is_told_what_is_left_of_it():

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train.algorithms.apg.apg import ApgLearner
 from motion_cueing.train.algorithms.linear.linear import (
     LinearLearner,

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.task import ObservationOptions
-from motion_cueing.envs.task.observation import layout_of
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train.algorithms.sb3.policy import SkipPolicy, load_network, network_of
 from motion_cueing.train.algorithms.sb3.sb3 import CLASSES, arguments
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv

@@ -1,21 +1,24 @@
-"""Gain scheduling: the classical washout with parameters that an agent changes at every step."""
+"""Policies on the classical washout: gain scheduling by an agent, and the best set for each maneuver."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import warp as wp
 
-from ....envs.errors import ActionError, ConfigurationError, DataError
-from ....envs.platform.machines import Cab
+from ....envs.cues import CueTrace
+from ....envs.errors import ActionError, ConfigurationError, DataError, UnknownNameError
+from ....envs.platform.machines import Cab, Platform
+from ....envs.settings import configuration, preset_names
 from ....envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ....envs.simulator.simulator import TIME_STEP
-from ...policy import Array, checked_observation
+from ...policy import WHOLE_DRIVE, Array, Policy, checked_observation
 from ..kernels.blocks import Parameters
-from .family import ClassicalWashout, WashoutParameters, kernel_parameters
+from .family import ClassicalWashout, WashoutParameters, kernel_parameters, load_washout
 
 KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
     "cue_scale": ("force_scale", "rate_scale"),
@@ -115,3 +118,64 @@ def _checked_gains(gains: Array, n: int) -> Array:
     if values.shape != shape or not np.isfinite(values).all():
         raise ActionError(f"gains must be finite and of shape {shape}, found {values.shape}")
     return values
+
+
+PER_MANEUVER: Final = "classical-per-maneuver"
+_SETS: Final = Path(__file__).parent / "presets" / "per-maneuver"
+
+
+@configuration
+class PerManeuverParameters:
+    """Parameter sets by maneuver."""
+
+    sets: dict[str, WashoutParameters]
+
+
+def tuned_maneuvers() -> list[str]:
+    """Names of the maneuvers that have a parameter set."""
+    return preset_names(_SETS)
+
+
+def load_per_maneuver(maneuver: str) -> WashoutParameters:
+    """The best parameter set for a maneuver.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if maneuver not in tuned_maneuvers():
+        raise UnknownNameError(f"maneuver of {PER_MANEUVER}", maneuver, tuned_maneuvers())
+    return load_washout(_SETS / f"{maneuver}.yaml")
+
+
+class PerManeuverWashout(Policy):
+    """The classical washout with the best parameter set for the maneuver at hand.
+
+    Without a turntable it yaws the cab with the hexapod (k_T = 0), as the paper's EST3: the sets are tuned on
+    a machine with one.
+
+    Args:
+        platform: The machine.
+        dt: Time step, s.
+    """
+
+    name = PER_MANEUVER
+    information = WHOLE_DRIVE
+
+    def __init__(self, platform: Platform, dt: float = TIME_STEP) -> None:
+        self.platform: Platform = platform
+        self.time_step: float = dt
+        sets = {name: load_per_maneuver(name) for name in tuned_maneuvers()}
+        if platform.turntable is None:
+            sets = {name: replace(tuned, turntable_share=0.0) for name, tuned in sets.items()}
+        self.parameters: PerManeuverParameters = PerManeuverParameters(sets)
+
+    def for_drive(self, cues: CueTrace) -> Policy:
+        """The washout for a maneuver, by the name of its cues.
+
+        Raises:
+            UnknownNameError: no set has been tuned for it.
+        """
+        sets = self.parameters.sets
+        if cues.name not in sets:
+            raise UnknownNameError(f"maneuver of {PER_MANEUVER}", cues.name, sets)
+        return ClassicalWashout(replace(sets[cues.name], name=self.name), self.platform.cab, self.time_step)
