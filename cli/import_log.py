@@ -96,7 +96,7 @@ def import_plot(imported: ImportedLog) -> bytes:
 def _draw(figure: Figure, imported: ImportedLog) -> None:
     from ..envs.cues import GRAVITY
     from ..envs.logs.mounting import SMOOTHING_HZ
-    from ..envs.logs.timing import low_pass
+    from ..envs.logs.signals import low_pass
 
     axes = figure.subplots(4, 2)
     trace = imported.trace
@@ -129,7 +129,7 @@ def _scatter(
     axes: Axes, measured: Floats, expected: Floats | None, names: tuple[str, str], rate_hz: float
 ) -> None:
     from ..envs.logs.mounting import SMOOTHING_HZ, correlation
-    from ..envs.logs.timing import low_pass
+    from ..envs.logs.signals import low_pass
 
     if expected is None:
         axes.text(0.5, 0.5, "no speed in the log", ha="center", va="center")

@@ -83,7 +83,7 @@ class ServeCommand:
 class DriveCommand:
     """Drive a controller that `motion-cueing serve` runs: send cues in real time, check what comes back.
 
-    The exit status is 1 if nothing came back, or a set-point outside of the machine's limits. docs/loop.md
+    The exit status is 1 if nothing came back, or a set-point outside of the machine's limits. docs/reference/real-time.md
     describes the packets.
     """
 
@@ -248,7 +248,7 @@ def _report(command: ServeCommand, controller: Controller, server: Server, endpo
 
 def run_drive(command: DriveCommand) -> int:
     """Drive; the exit status is 1 if nothing came back, or something outside of the limits."""
-    from ..envs.interrupt import Interrupt
+    from ..envs.progress import Interrupt
     from ..realtime.client import Client, NetworkFaults, cues_at
     from ..realtime.packets import make_format
     from ..realtime.server import Endpoint, address_of, is_loopback

@@ -25,10 +25,10 @@ from ...envs.errors import DataError
 from ...envs.platform import Platform, actuator_limits
 from ...envs.platform.kernels.step import LEGS
 from ...envs.platform.kinematics import leg_motion
-from ...envs.platform.limits import limits_exceeded
+from ...envs.platform.machines import limits_exceeded
 from ...envs.settings import to_dict
 from ...envs.simulator.simulator import TIME_STEP, Simulator
-from ...envs.task.drives import slippery
+from ...envs.task.episode import slippery
 from ..metrics import Criteria, cue_error
 from ..policies import make_policy
 from ..results import drive_key

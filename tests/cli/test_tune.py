@@ -95,7 +95,7 @@ def test_ctrl_c_keeps_the_search_and_resume_ends_where_it_would_have(words, tmp_
     (tmp_path / "mine.search.json").unlink()
 
     with monkeypatch.context() as pressed:
-        pressed.setattr("motion_cueing.envs.interrupt.Interrupt", PressedLater)
+        pressed.setattr("motion_cueing.envs.progress.Interrupt", PressedLater)
         assert main(words) == 130
     assert "go on with: motion-cueing tune --algorithm classical --out mine.yaml" in capsys.readouterr().err
     assert len(load_record(tmp_path / "mine.search.json").results) == 3

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from ...baselines.policy import TaskPolicy
 from ...baselines.washout import ClassicalWashout, ScheduledWashout, WashoutParameters, load_washout
-from ...baselines.washout.classical.scheduled import KNOBS
+from ...baselines.washout.classical.policies import KNOBS
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
 from ...envs.platform.kernels.step import AXES
 from ...envs.platform.machines import Platform
-from ...envs.task.drives import platform_of
-from ...envs.task.observation import Layout, layout_of
+from ...envs.task.episode import platform_of
+from ...envs.task.kernels.observation import Layout, layout_of
 from ...envs.task.options import TaskOptions
 from . import names
 from .files import Record, contents_of, network_of, read, write

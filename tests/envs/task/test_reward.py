@@ -12,7 +12,7 @@ import pytest
 
 from motion_cueing.envs.task import DrivingSimulator, EpisodeOptions, RewardOptions, RewardWeights
 from motion_cueing.envs.task.kernels import reward as reward_page
-from motion_cueing.envs.task.kernels.reward import DECLARED, TERMS
+from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.evaluation.metrics import Criteria, beyond, false_cues
 
 from .tasks import drive
