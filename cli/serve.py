@@ -83,8 +83,8 @@ class ServeCommand:
 class DriveCommand:
     """Drive a controller that `motion-cueing serve` runs: send cues in real time, check what comes back.
 
-    The exit status is 1 if nothing came back, or a set-point outside of the machine's limits. docs/reference/real-time.md
-    describes the packets.
+    The exit status is 1 if nothing came back, or a set-point outside of the machine's limits.
+    docs/reference/real-time.md describes the packets.
     """
 
     maneuver: ManeuverName = "double-lane-change"
