@@ -13,7 +13,7 @@ from motion_cueing.baselines import make_policy, policy_names
 from motion_cueing.baselines.registry import POLICIES
 from motion_cueing.baselines.tuning.objective import WashoutSpace
 from motion_cueing.baselines.tuning.search import TuningOptions
-from motion_cueing.baselines.washout import WashoutParameters
+from motion_cueing.baselines.washout import WashoutParameters, register_family
 from motion_cueing.baselines.washout.batch import WashoutBatch
 from motion_cueing.baselines.washout.families import (
     FAMILIES,
@@ -21,7 +21,6 @@ from motion_cueing.baselines.washout.families import (
     family_presets,
     load_of,
     load_parameters,
-    register_family,
 )
 from motion_cueing.baselines.washout.policy import make_washout
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
