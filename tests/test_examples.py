@@ -16,6 +16,8 @@ from motion_cueing.train.agents import Agent
 
 from .repository import ROOT
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 TINY = {
     "train_with_stable_baselines3": ["1", "braking"],

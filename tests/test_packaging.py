@@ -19,6 +19,8 @@ import pytest
 
 from .repository import PACKAGES, ROOT, package_files
 
+pytestmark = pytest.mark.slow
+
 LOADERS = ("find_spec", "import_module", "load")
 """Functions whose first argument, where it is text, names a module."""
 METADATA = ("pyproject.toml", "setup.py", "README.md", "LICENSE")

@@ -21,6 +21,8 @@ from motion_cueing.realtime.server import Server
 
 from ..realtime.bench import Bench, lane_change
 
+pytestmark = pytest.mark.slow
+
 GENTLE = {"rate": 100, "overdue": 20.0, "hold": 30.0, "stale": 20.0, "steady": 0.0}
 """So that a machine that is slow for a moment fails nothing."""
 

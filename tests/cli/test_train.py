@@ -26,6 +26,8 @@ from motion_cueing.train.training import Training
 
 from ..train import tiny
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = (sys.executable, "-m", "motion_cueing.evaluation")
 
 

@@ -20,6 +20,8 @@ from ..envs.logs import synthetic_log
 from ..repository import ROOT
 from ..train import agents
 
+pytestmark = pytest.mark.slow
+
 DOCS = ROOT / "docs"
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
 FOLDERS = (

@@ -13,6 +13,8 @@ from motion_cueing.evaluation import Metrics, Trajectory, measure, rollout
 from motion_cueing.evaluation.studies.disturbances import with_dynamics
 from motion_cueing.train.agents import Agent, agent_names, get_agent
 
+pytestmark = pytest.mark.slow
+
 WASHOUTS = ("classical", "classical-tuned")
 """The better one by hand, and the better one on the roads that agents are trained on."""
 TILTS_MORE = {

@@ -15,6 +15,8 @@ from motion_cueing.realtime.machine import make_machine
 from ..envs.task.tasks import drive
 from ..train.agents import agent, ship
 
+pytestmark = pytest.mark.slow
+
 TOLD = TaskOptions(observation={"machine": True, "frame": "cab"}, action={"frame": "cab", "authority": 0.1})
 
 

@@ -25,6 +25,8 @@ from motion_cueing.evaluation import measure, rollout
 
 from .drives import DT, gentle, hard_braking, surge, turning, weaving
 
+pytestmark = pytest.mark.slow
+
 COARSE = OptimumOptions(steps=5, effort=1e-3)
 """One set of options for most tests: the program of a machine is made once for them all."""
 

@@ -8,6 +8,8 @@ import warp as wp
 from motion_cueing.envs.simulator.kernels.observation import observe_forward
 from motion_cueing.envs.simulator.kernels.step import reset_forward, step_kernel
 
+pytestmark = pytest.mark.slow
+
 # Loops kept as loops: the same code in a third of the time to compile.
 step_in_loops = wp.kernel(
     step_kernel, enable_backward=False, module="unique", module_options={"max_unroll": 4}

@@ -24,6 +24,8 @@ from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector, Ta
 
 from .tasks import EVERY_OPTION, SHORT, drive, options
 
+pytestmark = pytest.mark.slow
+
 ID = motion_cueing.envs.ENVIRONMENT_ID
 
 

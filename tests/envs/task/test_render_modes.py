@@ -24,6 +24,8 @@ from motion_cueing.envs.task import DrivingSimulator, DrivingSimulatorVector
 
 from .tasks import SHORT, drive
 
+pytestmark = pytest.mark.slow
+
 ID = motion_cueing.envs.ENVIRONMENT_ID
 SIZE = (480, 270)
 PUSH = np.full(9, 0.4, dtype=np.float32)

@@ -27,6 +27,8 @@ from motion_cueing.train.training import Training
 from . import jobs
 from .light import Counting
 
+pytestmark = pytest.mark.slow
+
 ELSEWHERE = ("processes", "ray")
 
 

@@ -26,6 +26,8 @@ from motion_cueing.train.training import Training
 
 from . import jobs
 
+pytestmark = pytest.mark.slow
+
 SPACE = {
     "rate": Choice(low=1e-4, high=1e-1, log=True),
     "size": Choice(low=1, high=8, integer=True),

@@ -22,6 +22,8 @@ from motion_cueing.train.training import Training
 
 from .. import tiny
 
+pytestmark = pytest.mark.slow
+
 SPACE = {
     "hyperparameters.policy_kwargs.net_arch": {"choices": [[4], [6, 6]]},
     "hyperparameters.learning_rate": {"low": 1e-4, "high": 1e-2, "log": True},

@@ -20,6 +20,8 @@ from motion_cueing.train.training import Training
 
 from .. import tiny
 
+pytestmark = pytest.mark.slow
+
 HERE = studies.Place("local")
 
 

@@ -21,6 +21,8 @@ from motion_cueing.train.algorithms.dagger.dagger import DaggerLearner, Teacher,
 from motion_cueing.train.config import TrainingConfig, load_config
 from motion_cueing.train.registry import StopTraining
 
+pytestmark = pytest.mark.slow
+
 SMALL = {
     "n_envs": 4,
     "steps": 4 * 20 * 6,
