@@ -89,7 +89,7 @@ def test_a_single_drive_can_be_looked_into(tmp_path, capsys):
 
 
 def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
-    request = EnduranceRequest(
+    asked = EnduranceRequest(
         Endurance(duration=2.0), PAPER, {"classical": "classical"}, drive_seeds(4, 0), 2, tmp_path
     )
     done = []
@@ -99,16 +99,16 @@ def test_what_is_done_is_kept_when_it_is_stopped(tmp_path):
         if sum(done) > 4 * 2.0:
             raise Stopped
 
-    found = EnduranceRun(request).drive(tell)
+    found = EnduranceRun(asked).drive(tell)
     assert not found.finished
     assert found.driven == len(found.policies["classical"].drives) == 2
-    again = EnduranceRun(request)
+    again = EnduranceRun(asked)
     assert again.seconds == 2 * 2 * 2.0
     found = again.drive(lambda what, seconds: None)
     assert found.finished
     assert (found.driven, len(found.policies["classical"].drives)) == (2, 4)
     # Another way of driving is another key: nothing of this is taken.
-    other = EnduranceRequest(Endurance(duration=3.0), PAPER, request.policies, request.seeds, 2, tmp_path)
+    other = EnduranceRequest(Endurance(duration=3.0), PAPER, asked.policies, asked.seeds, 2, tmp_path)
     assert EnduranceRun(other).seconds == 4 * 2 * 3.0
 
 

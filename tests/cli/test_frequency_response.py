@@ -60,7 +60,7 @@ class Tired:
 
 
 @pytest.fixture
-def three(monkeypatch):
+def benchmark(monkeypatch):
     """A benchmark of three: one that can be tested, one that knows its drives alone, one that fails."""
     monkeypatch.setattr(
         "motion_cueing.evaluation.benchmark.benchmark_policies",
@@ -72,12 +72,10 @@ def three(monkeypatch):
     )
 
 
-def test_the_benchmark_skips_what_knows_no_sinusoids_and_goes_on_after_a_failure(three, tmp_path, capsys):
+def test_the_benchmark_skips_what_knows_no_sinusoids_and_goes_on_after_a_failure(benchmark, tmp_path, capsys):
     assert main([*quick("benchmark"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
-    assert (
-        "skipped classical-per-maneuver: classical-per-maneuver has a set for each standard maneuver" in shown
-    )
+    assert "skipped classical-per-maneuver: classical-per-maneuver has a set for each" in shown
     assert "failed adaptive: RuntimeError: tired" in shown
     assert [one.policy for one in load_json(tmp_path / "frequency-response.json")] == ["no-motion"]
 

@@ -196,7 +196,7 @@ def test_every_family_is_tuned_the_same_way(algorithm, start, words, tmp_path, c
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (["--method", "gradient"], "washout has no gradient; use method cma"),
+        (["--method", "gradient"], "the adaptive washout has no gradient; use method cma"),
         (
             ["--start", "classical"],
             "a set of the classical washout; give one of the adaptive washout",
