@@ -37,11 +37,14 @@ class Registry(Generic[T]):
         kind: What is registered, for messages: "policy".
         group: Group of entry points by which installed packages take part: "motion_cueing.policies".
         renamed: Names of earlier versions and what they are called now.
+        extra: Extra of this project whose libraries the items need, for messages.
     """
 
-    def __init__(self, kind: str, group: str, renamed: Mapping[str, str] | None = None) -> None:
-        self.kind, self.group = kind, group
-        self._renamed = dict(renamed or {})
+    def __init__(
+        self, kind: str, group: str, renamed: Mapping[str, str] | None = None, extra: str = ""
+    ) -> None:
+        self.kind, self.group, self.extra = kind, group, extra
+        self.renamed = dict(renamed or {})
         self._entries: dict[str, _Entry] = {}
         self._discovered = False
 
@@ -96,6 +99,11 @@ class Registry(Generic[T]):
             module, _, attribute = entry.item.partition(":")
             try:
                 entry.item = getattr(import_module(module), attribute)
+            except ModuleNotFoundError as error:
+                hint = f": pip install 'motion-cueing-gym[{self.extra}]'" if self.extra else ""
+                raise ConfigurationError(
+                    f"{self.kind} {name!r} needs {error.name}, which is not installed{hint}"
+                ) from error
             except (ImportError, AttributeError) as error:
                 raise ConfigurationError(
                     f"{self.kind} {name!r}: {entry.item} cannot be loaded ({error})"
@@ -110,7 +118,7 @@ class Registry(Generic[T]):
     def _entry(self, name: str) -> _Entry:
         self._discover()
         if name not in self._entries:
-            raise UnknownNameError(self.kind, str(name), self._entries, self._renamed)
+            raise UnknownNameError(self.kind, str(name), self._entries, self.renamed)
         return self._entries[name]
 
     def _discover(self) -> None:

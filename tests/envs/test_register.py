@@ -11,6 +11,7 @@ import pytest
 
 from motion_cueing.envs import car, maneuvers, perception, platform
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
+from motion_cueing.envs.registry import Registry
 
 PACKAGE = '''
 """Things of another package, made of the project's."""
@@ -135,3 +136,10 @@ def test_names_are_listed_without_warp_and_scipy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_missing_library_is_named_with_the_command_that_installs_it():
+    registry = Registry("algorithm", "motion_cueing.nobody", extra="train")
+    registry.register("mine", "no_such_library_anywhere:Mine")
+    with pytest.raises(ConfigurationError, match=r"needs no_such_library.*gym\[train\]"):
+        registry["mine"]

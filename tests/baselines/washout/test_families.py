@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import make_policy, policy_names
+from motion_cueing.baselines.registry import POLICIES
 from motion_cueing.baselines.tuning.objective import WashoutSpace
 from motion_cueing.baselines.tuning.search import TuningOptions
 from motion_cueing.baselines.washout import WashoutParameters
@@ -122,3 +123,4 @@ def test_a_family_of_another_package_takes_one_registration(tmp_path):
     finally:
         # A registry has no way to forget, and other tests list all families.
         del FAMILIES._entries["mine"]
+        POLICIES._entries.pop("mine-by-hand", None)

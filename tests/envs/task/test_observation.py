@@ -13,7 +13,6 @@ from motion_cueing.baselines.washout import ClassicalWashout
 from motion_cueing.envs.simulator.kernels.observation import ROWS, SLICES
 from motion_cueing.envs.task import ActionOptions, DrivingSimulator, ObservationOptions, RandomizationOptions
 from motion_cueing.envs.task.kernels import observation as layout_page
-from motion_cueing.envs.task.kernels.observation import observation_table
 
 from .tasks import drive
 
@@ -240,17 +239,6 @@ def test_noise_differs_from_step_to_step_and_from_episode_to_episode():
     where = env.batch.layout.slices["simulator_force"]
     seen = [env.reset(seed=1)[0][where], env.step(np.zeros(9))[0][where], env.reset()[0][where]]
     assert len({part.tobytes() for part in seen}) == 3
-
-
-def rows_of(text: str) -> list[list[str]]:
-    """Name, entries, unit, scale and bound of every row of tables in Markdown."""
-    lines = [line.split("|") for line in text.splitlines() if line.startswith("| `")]
-    return [[cell.strip().strip("`") for cell in line[1:6]] for line in lines if len(line) == 8]
-
-
-def test_page_tells_every_row_as_it_is():
-    page = (Path(__file__).parents[3] / "docs" / "environment.md").read_text(encoding="utf-8")
-    assert rows_of(page) == rows_of(observation_table())
 
 
 EVERYTHING = {"preview": 2, "memory": (1.0,), "perceived": True, "true_motion": True, "machine": True}
