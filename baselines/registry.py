@@ -25,7 +25,7 @@ import yaml
 
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.registry import Registry
-from ..envs.settings import preset_names, read_yaml
+from ..envs.settings import preset_names
 
 if TYPE_CHECKING:
     from ..envs.platform.machines import Platform
@@ -44,9 +44,6 @@ POLICIES: Final[Registry[Factory]] = Registry(
 
 POLICY_FILES: Final[Registry[Reader]] = Registry("policy file", "motion_cueing.policy_files")
 """What reads a policy's file, by the ending of its name without the dot."""
-
-PREDICTIVE: Final = ("mpc", "nmpc")
-"""Algorithms of predictive control, as files name them."""
 
 _DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
 
@@ -168,18 +165,6 @@ def _optimum(objective: Any, platform: Platform) -> Policy:
     return Optimum(platform, OptimumOptions(objective=objective), progress=False)
 
 
-def _from_yaml(path: Path, platform: Platform) -> Policy:
-    from .washout import FAMILIES, load_parameters, make_washout
-    from .washout.families import algorithm_of, check_algorithm
-
-    algorithm = check_algorithm(algorithm_of(read_yaml(path)), path, (*FAMILIES, *PREDICTIVE))
-    if algorithm not in PREDICTIVE:
-        return make_washout(load_parameters(path), platform.cab)
-    from .mpc import load_mpc, make_mpc
-
-    return make_mpc(platform, load_mpc(path), path.stem)
-
-
 def _description(path: Path) -> str:
     """The description in a preset's file, whose first lines hold it."""
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
@@ -214,7 +199,9 @@ def _register_own() -> None:
     for family in ("classical", "adaptive", "optimal"):
         register_presets(Path(__file__).parent / "washout" / family / "presets")
     for ending in ("yaml", "yml"):
-        POLICY_FILES.register(ending, _from_yaml, "a washout or a predictive controller")
+        POLICY_FILES.register(
+            ending, f"{__package__}.washout.policy:policy_of_file", "a washout or a predictive controller"
+        )
 
 
 _register_own()

@@ -290,13 +290,7 @@ def _checked_state(state: Any, n: int) -> list[Memory] | list[None]:
 
 
 class PreviewController(Policy):
-    """Model predictive control with preview: it needs the drive before it begins.
-
-    Args:
-        platform: The machine.
-        parameters: Of the controller.
-        name: In tables.
-    """
+    """Model predictive control with preview: it needs the drive before it begins."""
 
     def __init__(self, platform: Platform, parameters: MpcParameters, name: str = "mpc-preview") -> None:
         self.name, self.time_step, self.parameters = name, TIME_STEP, parameters
@@ -312,13 +306,7 @@ class PreviewController(Policy):
 def make_mpc(
     platform: Platform, parameters: MpcParameters | None = None, name: str = "mpc"
 ) -> PredictiveController | PreviewController:
-    """Model predictive control for a machine, with preview where the parameters have one.
-
-    Args:
-        platform: The machine.
-        parameters: Of the controller; default: linear, without preview.
-        name: In tables.
-    """
+    """Model predictive control for a machine, with preview where the parameters have one; default: none."""
     parameters = parameters or MpcParameters()
     kind = PreviewController if parameters.forecast.preview > 0.0 else PredictiveController
     return kind(platform, parameters, name)

@@ -65,23 +65,12 @@ class Grid:
     weights: Floats
 
     def motion(self, position: Floats, rate: Floats, accelerations: Floats) -> tuple[Floats, Floats]:
-        """Positions and rates at the nodes, (n, k) each.
-
-        Args:
-            position: (k,) now, m or rad.
-            rate: (k,) now.
-            accelerations: (n, k) at the nodes.
-        """
+        """Positions and rates (n, k) at the nodes, from those now (k,) and accelerations (n, k)."""
         free = position + np.outer(self.times, rate)
         return free + self.position @ accelerations, rate + self.rate @ accelerations
 
     def at(self, accelerations: Floats, times: Floats) -> Floats:
-        """Accelerations (m, k) at other times; constant before the first and after the last node.
-
-        Args:
-            accelerations: (n, k) at the nodes.
-            times: (m,) from now, s.
-        """
+        """(m, k) of accelerations (n, k) at times (m,), s; constant before and after the nodes."""
         j = np.clip(np.searchsorted(self.times, times) - 1, 0, len(self.times) - 2)
         begin, end = self.times[j], self.times[j + 1]
         share = np.clip((times - begin) / (end - begin), 0.0, 1.0)[:, None]

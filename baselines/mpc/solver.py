@@ -136,13 +136,9 @@ class HorizonProgram:
     def cost(
         self, motion: Motion, about: Linearization, reference: Floats, free_response: Floats | None
     ) -> QuadraticCost:
-        """Cost about a motion.
+        """Cost about a motion, with the reference cue (n, 6), SI.
 
-        Args:
-            motion: At the nodes.
-            about: Cues and limits, linearized there.
-            reference: (n, 6) reference cue, SI.
-            free_response: (n, 6) perceived error that past errors leave, in zones; None for none.
+        ``free_response`` (n, 6) is the perceived error that past errors leave, in zones; None for none.
         """
         slope = self.condensed(about.slopes[:, :N_CUES])
         if self._perceived is not None:
@@ -321,13 +317,7 @@ def solve(
 ) -> QpSolution:
     """Minimize a cost under bounds.
 
-    Args:
-        program: Maps unknowns to rows.
-        cost: Hessian and gradient.
-        about: The rows, linearized.
-        bounds: Of the rows.
-        guess: Rows that may be active, as ``QpSolution.active``.
-        rounds: Greatest number of dual programs.
+    ``guess`` are rows that may be active, as ``QpSolution.active``; ``rounds`` limits the dual programs.
     """
     unsolved = program.change(np.zeros(program.size))
     factor, failed = lapack.dpotrf(cost.hessian, lower=1)
@@ -362,13 +352,7 @@ def _solve_dual(
 ) -> tuple[Floats, Floats] | None:
     """Unknowns and multipliers under the working rows; None where the solver gives up.
 
-    Args:
-        program: Maps unknowns to rows.
-        about: The rows, linearized.
-        bounds: Of the rows.
-        factor: L of the Hessian.
-        free: (m,) minimum without rows.
-        working: The rows A.
+    ``factor`` is L of the Hessian, ``free`` (m,) the minimum without rows.
     """
     side, row = np.divmod(working, about.values.size)
     sign = 1.0 - 2.0 * side
@@ -410,12 +394,7 @@ class Plan:
 
 
 class Planner:
-    """Gauss-Newton sequential quadratic programming over the horizon.
-
-    Args:
-        platform: The machine.
-        parameters: Of the controller.
-    """
+    """Gauss-Newton sequential quadratic programming over the horizon."""
 
     def __init__(self, platform: Platform, parameters: MpcParameters) -> None:
         self.grid = make_grid(parameters.nodes)

@@ -144,12 +144,7 @@ def store_plan(key: str, plan: Plan) -> None:
 
 
 def load_plan(key: str, steps: int) -> Plan | None:
-    """The plan stored under a key; None where there is none, or a damaged one.
-
-    Args:
-        key: Of :func:`key_of`.
-        steps: Time steps it must have.
-    """
+    """The plan of some time steps stored under a key; None where there is none, or a damaged one."""
     try:
         with np.load(_path(key), allow_pickle=False) as file:
             accelerations, start = np.array(file["accelerations"]), np.array(file["start"])
@@ -194,14 +189,7 @@ class Playback:
 
 
 class Player:
-    """A machine without lag or dead time on its way through a drive.
-
-    Args:
-        platform: The machine.
-        cues: The drive.
-        vestibular: The driver's perception.
-        start: (9,) pose to begin at.
-    """
+    """A machine without lag or dead time on its way through a drive, from a start pose (9,)."""
 
     def __init__(
         self, platform: Platform, cues: CueTrace, vestibular: VestibularModel, start: ArrayLike

@@ -125,12 +125,7 @@ class Optimum(Policy):
 
 
 class PlannedDrive(Policy):
-    """Plays the plan for one drive. A machine that begins elsewhere than planned gets a plan of its own.
-
-    Args:
-        optimum: Makes plans.
-        cues: The drive.
-    """
+    """Plays the plan for one drive. A machine that begins elsewhere than planned gets a plan of its own."""
 
     information = WHOLE_DRIVE
 

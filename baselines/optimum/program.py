@@ -121,12 +121,7 @@ class PerceivedErrorFilter:
     place: NDArray[np.int64]
 
     def next_state(self, filters: Floats, error: Floats) -> Floats:
-        """(m,) the states for the next sample.
-
-        Args:
-            filters: (6, 3) states of the published filters now, otoliths before canals.
-            error: (6,) the error now.
-        """
+        """(m,) the next states, from the filters' (6, 3), otoliths first, and the error (6,)."""
         return np.asarray(self.a @ (filters.ravel()[self.place] / self.size) + self.b @ error)
 
 
@@ -205,14 +200,7 @@ def mean_accelerations(nodes: NDArray[np.float64], steps: int) -> NDArray[np.flo
 def interval(
     machine: SymbolicMachine, options: OptimumOptions, perceived: PerceivedErrorFilter | None, dt: float
 ) -> Interval:
-    """The motion and the errors from one node to the next.
-
-    Args:
-        machine: The machine.
-        options: Zones, and the number of steps.
-        perceived: Vestibular filter of the errors; None to take them as they are.
-        dt: Time step of the machine, s.
-    """
+    """The motion and the errors, filtered by perception if that is given, from one node to the next."""
     q, v, a, b = (cs.SX.sym(name, N_AXES) for name in "qvab")
     x = cs.SX.sym("x", 0 if perceived is None else len(perceived.a))
     reference = cs.SX.sym("reference_cue", N_CUES + 1, options.steps)

@@ -59,14 +59,7 @@ class SolveMonitor:
 def iteration_callback(
     variables: int, constraints: int, parameters: int, monitor: SolveMonitor
 ) -> Expression:
-    """CasADi's callback after every iteration.
-
-    Args:
-        variables: Their number.
-        constraints: Their number.
-        parameters: Their number.
-        monitor: Counts the iterations.
-    """
+    """CasADi's callback after every iteration of a program of this size."""
     sizes = {"x": variables, "f": 1, "g": constraints, "lam_x": variables, "lam_g": constraints}
 
     class Callback(cs.Callback):  # type: ignore[misc]
@@ -168,12 +161,7 @@ def triplets(function: Expression) -> tuple[Indices, Indices]:
 
 
 def assembled(shape: tuple[int, int], parts: list[tuple[Indices, Indices, Expression]]) -> Expression:
-    """A sparse matrix of nonzeros at rows and columns, no place twice.
-
-    Args:
-        shape: Of the matrix.
-        parts: Rows, columns and values (a column of symbols) of each part.
-    """
+    """A sparse matrix of parts: rows, columns and values (a column of symbols), no place twice."""
     rows, columns = (np.concatenate([part[i] for part in parts]) for i in range(2))
     order = np.lexsort((rows, columns))
     sparsity = cs.Sparsity.triplet(*shape, rows[order].tolist(), columns[order].tolist())

@@ -1,6 +1,5 @@
 """Washouts: filters that reproduce onsets, tilt for sustained force, and return to neutral."""
 
-from ..registry import register_presets
 from .classical import (
     ClassicalWashout,
     HighPass,
@@ -12,7 +11,7 @@ from .classical import (
     load_washout,
     washout_presets,
 )
-from .families import FAMILIES, Coordinate, Family, load_parameters
+from .families import FAMILIES, Coordinate, Family, load_parameters, register_family
 from .policy import WashoutPolicy, make_washout
 
 __all__ = [
@@ -33,15 +32,3 @@ __all__ = [
     "register_family",
     "washout_presets",
 ]
-
-
-def register_family(name: str, family: Family, description: str = "") -> None:
-    """Add a washout family; its presets become policies by name.
-
-    Args:
-        name: ``Family.name``.
-        family: The family.
-        description: One line for lists.
-    """
-    FAMILIES.register(name, family, description)
-    register_presets(family.presets)

@@ -25,6 +25,7 @@ from pydantic import PlainValidator
 from ...envs.errors import ConfigurationError, UnknownNameError
 from ...envs.registry import Registry
 from ...envs.settings import Vector2, Vector3, configuration, from_dict, load, named, preset_names, read_yaml
+from ..registry import register_presets
 from .kernels.launch import Kernels
 
 
@@ -120,9 +121,22 @@ FAMILIES: Final[Registry[Family]] = Registry("algorithm", "motion_cueing.washout
 """Every family by name."""
 
 
-FAMILIES.register("classical", f"{__package__}.classical.family:FAMILY", "the classical washout")
-FAMILIES.register("adaptive", f"{__package__}.adaptive.family:FAMILY", "the adaptive washout")
-FAMILIES.register("optimal", f"{__package__}.optimal.family:FAMILY", "the optimal washout")
+def register_family(name: str, family: Family | str, description: str = "") -> None:
+    """Add a family.
+
+    Args:
+        name: ``Family.name``.
+        family: The family, whose presets become policies by name; or ``"module:attribute"`` where to find it.
+        description: One line for lists.
+    """
+    FAMILIES.register(name, family, description)
+    if isinstance(family, Family):
+        register_presets(family.presets)
+
+
+register_family("classical", f"{__package__}.classical.family:FAMILY", "the classical washout")
+register_family("adaptive", f"{__package__}.adaptive.family:FAMILY", "the adaptive washout")
+register_family("optimal", f"{__package__}.optimal.family:FAMILY", "the optimal washout")
 
 
 def algorithm_of(parameters: Any) -> str:

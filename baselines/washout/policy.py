@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
 import numpy as np
 import warp as wp
@@ -12,13 +12,25 @@ from numpy.typing import NDArray
 
 from ...envs.arrays import real, vec9
 from ...envs.platform.machines import Cab, Platform
+from ...envs.settings import read_yaml
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ...envs.simulator.simulator import N_AXES, TIME_STEP
 from ..policy import Array, Policy, Starts, checked_episode_start, checked_observation, wrong_state
-from .families import FAMILIES, FamilyParameters, family_of, load_of, load_parameters
+from .families import (
+    FAMILIES,
+    FamilyParameters,
+    algorithm_of,
+    check_algorithm,
+    family_of,
+    load_of,
+    load_parameters,
+)
 from .kernels.launch import Kernels
 
 P = TypeVar("P", bound=FamilyParameters)
+
+_PREDICTIVE: Final = ("mpc", "nmpc")
+"""Algorithms of predictive control, as files name them."""
 
 
 def start_pose(p: FamilyParameters) -> Array:
@@ -148,3 +160,18 @@ def make_washout(parameters: FamilyParameters, cab: Cab) -> WashoutPolicy[Any]:
     own: dict[str | None, Any] = {kind.algorithm: kind for kind in WashoutPolicy.__subclasses__()}
     policy: WashoutPolicy[Any] = own.get(family_of(parameters).name, WashoutPolicy)(parameters, cab)
     return policy
+
+
+def policy_of_file(path: Path, platform: Platform) -> Policy:
+    """The policy of a YAML file, for a machine: a washout, or predictive control.
+
+    Raises:
+        DataError: the file cannot be read.
+        ConfigurationError: a field of it is wrong.
+    """
+    algorithm = check_algorithm(algorithm_of(read_yaml(path)), path, (*FAMILIES, *_PREDICTIVE))
+    if algorithm not in _PREDICTIVE:
+        return make_washout(load_parameters(path), platform.cab)
+    from ..mpc import load_mpc, make_mpc
+
+    return make_mpc(platform, load_mpc(path), path.stem)

@@ -14,7 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from ..arrays import FLOAT, vec6
@@ -22,10 +21,8 @@ from ..cues import GRAVITY, CueTrace
 from ..errors import DataError
 from .kernels.driver import COLUMNS, SUBSTEPS, Driver, DriverParameters, Row, Task, drive_all, vec4
 from .kernels.vehicle import CarParameters
-from .plans import DT, Path, Schedule, clothoids
+from .plans import DT, Floats, Path, Schedule, clothoids
 from .vehicles import Car
-
-Floats = NDArray[np.float64]
 
 SPACING: Final = 0.1
 """Between the points of a track, m: what a tire levels out."""
@@ -198,10 +195,6 @@ def straight(length: float = 1.0) -> Path:
 
 def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
     """Drive every plan, all in one kernel launch.
-
-    Args:
-        plans: One a drive.
-        device: A Warp device.
 
     Returns:
         One trace a plan, sampled at 100 Hz, at the origin of F_A, with the channels

@@ -14,7 +14,6 @@ from functools import lru_cache
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy import sparse
 from scipy.ndimage import gaussian_filter1d
@@ -27,10 +26,8 @@ from ..car.vehicles import Car
 from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .roads import KMH
+from .roads import KMH, Floats
 from .standard import Maneuver
-
-Floats = NDArray[np.float64]
 
 GRID: Final = 1.0
 """Distance between the points of a planned way, m."""

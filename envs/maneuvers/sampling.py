@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from ..car.plans import STEP, Path
@@ -15,9 +14,7 @@ from ..car.vehicles import Car, car_names, get_car
 from ..cues import CueTrace
 from ..errors import ConfigurationError, UnknownNameError
 from ..settings import NonNegative, check_names, check_range, configuration
-from .roads import KINDS, Road, Style, along_path, speed_limit
-
-Floats = NDArray[np.float64]
+from .roads import KINDS, Floats, Road, Style, along_path, speed_limit
 
 SETTLE: Final = 3.0
 """Straight and steady driving before the first event, s."""
@@ -103,10 +100,10 @@ def random_drive(
     car: Car | None = None,
     drives: RandomDrives | None = None,
 ) -> CueTrace:
-    """One random drive.
+    """One random drive; the same seed gives the same drive.
 
     Args:
-        seed: The same seed gives the same drive.
+        seed: From 0 up.
         duration: 0.1 s to a day, s.
         kind: "urban", "rural", "highway", "track", "hilly", "strip" or "cones"; drawn if None.
         car: Drawn from ``drives.cars`` if None.

@@ -95,12 +95,7 @@ def leg_motion(hexapod: Hexapod, pose: Floats, pose_rate: Floats) -> LegMotion:
 
 
 def leg_jacobian(arms: Floats, legs: Floats) -> Floats:
-    """(..., 6, 6) leg rates for the platform's velocity and angular velocity, both in F_V.
-
-    Args:
-        arms: (..., 6, 3) A_i from the origin of F_H, in F_V, m.
-        legs: (..., 6, 3) from B_i to A_i, in F_V, m.
-    """
+    """(..., 6, 6) leg rates for the platform's velocity and angular velocity, of :func:`leg_vectors`."""
     directions = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
     return np.concatenate([directions, np.cross(arms, directions)], axis=-1)
 

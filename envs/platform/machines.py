@@ -13,6 +13,8 @@ from pydantic import Field
 from ..errors import ConfigurationError
 from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
 
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Joints = Annotated[tuple[Vector3, ...], Field(min_length=6, max_length=6)]
 ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "leg_5", "leg_6", "turntable")
 """Names of the nine actuators."""
@@ -198,10 +200,6 @@ def actuator_limits(platform: Platform) -> dict[str, NDArray[np.float64]]:
     limits["position_min"][limits["position_min"] <= -UNLIMITED] = -np.inf
     limits["position_max"][limits["position_max"] >= UNLIMITED] = np.inf
     return limits
-
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 class Exceeded(NamedTuple):

@@ -58,13 +58,7 @@ class PlatformRanges:
 def random_platform(
     platform: Platform, ranges: PlatformRanges, rng: np.random.Generator, name: str
 ) -> Platform:
-    """A machine drawn around another one that holds its platform at neutral.
-
-    Args:
-        platform: The one it is drawn around.
-        ranges: How it may differ.
-        rng: Where it is drawn from.
-        name: Of the machine.
+    """A machine drawn around another one, within ranges, that holds its platform at neutral.
 
     Raises:
         ConfigurationError: none of many closes.

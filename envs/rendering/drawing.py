@@ -19,6 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import MotionCueingError
 from .theme import AMBIENT, BACKDROP, DIFFUSE, LIGHT, SHININESS, SKYLIGHT, TEXT, Color
 
+Floats = NDArray[np.float64]
+
 
 class RenderingUnavailableError(MotionCueingError, ImportError):
     """A package that draws or writes pictures is not installed."""
@@ -47,8 +49,6 @@ def load(module: str, package: str) -> ModuleType:
             f"rendering needs {package}: pip install 'motion-cueing-gym[render]'"
         ) from None
 
-
-Floats = NDArray[np.float64]
 
 NEAR: Final = 2.0
 """Distance of the near plane, m: nothing closer is drawn."""
@@ -212,15 +212,7 @@ def cap(n: int, first: int, top: bool) -> Ints:
 
 
 def prism(outline: Floats, top: float, bottom: float, color: Color, gloss: float = 0.0) -> Mesh:
-    """A vertical prism.
-
-    Args:
-        outline: (n, 2) convex, turning from x to y.
-        top: z of its upper face, m.
-        bottom: z of its lower face, m.
-        color: Of all faces.
-        gloss: Of all faces.
-    """
+    """A vertical prism between z = ``top`` and ``bottom``, m; the outline (n, 2) is convex, from x to y."""
     n = len(outline)
     rings = [np.column_stack([outline, np.full(n, z)]) for z in (top, bottom)]
     faces = np.concatenate([ring_walls(n, 2), cap(n, 0, True), cap(n, n, False)])
@@ -409,12 +401,7 @@ _ANCHORS: Final = {"left": 0.0, "center": 0.5, "right": 1.0}
 
 
 class Canvas:
-    """Draws in units of a picture 720 high, whatever its true size.
-
-    Args:
-        pygame: The module.
-        size: Width and height of the picture, pixels.
-    """
+    """Draws in units of a picture 720 high, whatever its true size (width and height, pixels)."""
 
     def __init__(self, pygame: ModuleType, size: tuple[int, int]) -> None:
         self._pygame: Any = pygame
@@ -476,17 +463,7 @@ class Canvas:
         anchor: str = "left",
         bold: bool = False,
     ) -> None:
-        """A line of text.
-
-        Args:
-            x: Of its anchor.
-            y: Of its middle.
-            words: What it says.
-            size: Height of the type.
-            color: Of the type.
-            anchor: "left", "center" or "right": the end that lies at ``x``.
-            bold: Heavy type.
-        """
+        """A line of text, its middle at ``y``, its ``anchor`` ("left", "center", "right") at ``x``."""
         image = self._rendered(words, size, color, bold)
         wide, high = image.get_size()
         corner = (x * self.unit - _ANCHORS[anchor] * wide, y * self.unit - 0.5 * high)

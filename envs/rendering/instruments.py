@@ -59,12 +59,7 @@ class CueHistory:
         return min(self._count, self._capacity)
 
     def append(self, time: float, reference: ArrayLike, simulated: ArrayLike) -> None:
-        """Add a sample.
-
-        Args:
-            time: s, later than the last one.
-            reference: (6,) what the car does.
-            simulated: (6,) what the simulator does.
+        """Add a sample: a time, s, later than the last one, and the reference and simulator cues (6,).
 
         Raises:
             DataError: a shape is wrong, a value is not finite, or time does not increase.

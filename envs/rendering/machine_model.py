@@ -7,16 +7,14 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import DataError
 from ..platform.kinematics import rotation
 from ..platform.machines import Carriage, Hexapod, Platform
 from . import theme
-from .drawing import Mesh, along, box, circle, joined, mesh, prism, ring_walls, sphere
+from .drawing import Floats, Mesh, along, box, circle, joined, mesh, prism, ring_walls, sphere
 from .surroundings import LENGTH, dashboard, driver_figure, seat, seat_back, shell, steering_wheel, wheels
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

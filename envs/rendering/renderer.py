@@ -14,7 +14,7 @@ from ..errors import ConfigurationError
 from ..platform.kernels.step import CARRIAGE, LEGS, TURNTABLE
 from ..platform.machines import Platform
 from . import theme
-from .drawing import SUPERSAMPLING, Camera, Canvas, Mesh, Painter, load_pygame, orbit
+from .drawing import SUPERSAMPLING, Camera, Canvas, Floats, Mesh, Painter, load_pygame, orbit
 from .instruments import PANEL_WIDTH, CueHistory, draw_panel
 from .machine_model import (
     Frame,
@@ -54,8 +54,6 @@ def append_state(history: CueHistory, time: float, state: Any) -> None:
     history.append(time, reference, simulated)
 
 
-Floats = NDArray[np.float64]
-
 _AZIMUTH: Final = np.radians(-134.0)
 """Where the camera stands: behind the machine, on its left."""
 _ELEVATION: Final = np.radians(17.0)
@@ -81,12 +79,7 @@ class Arrows:
 
 
 class Scene:
-    """Draws a machine.
-
-    Args:
-        platform: The machine.
-        pygame: The module.
-    """
+    """Draws a machine in its hall, in three dimensions."""
 
     def __init__(self, platform: Platform, pygame: ModuleType) -> None:
         self._platform, self._pygame = platform, pygame
@@ -224,9 +217,7 @@ class Renderer:
     def frame(self, motion: MotionView, cues: CueHistory) -> Picture:
         """A frame, (height, width, 3); the same input always gives the same pixels.
 
-        Args:
-            motion: Where the machine stands.
-            cues: Reference and simulator cues; the last sample is drawn as arrows at the driver's head.
+        The last sample of the cues is drawn as arrows at the driver's head.
         """
         self._stage.blit(self._backdrop, (0, 0))
         arrows = Arrows(cues.reference_cue[-1, :3], cues.simulator_cue[-1, :3]) if len(cues) else None

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import theme
-from .drawing import Camera, Mesh, box, cap, circle, cylinder, joined, mesh, ring_walls, sphere
+from .drawing import Camera, Floats, Mesh, box, cap, circle, cylinder, joined, mesh, ring_walls, sphere
 
 
 @dataclass(frozen=True)
@@ -193,8 +193,6 @@ def _arm(head: NDArray[np.float64], side: float) -> Mesh:
     )
 
 
-Floats = NDArray[np.float64]
-
 _GRID_SPACING: Final = 2.0
 _SEGMENT: Final = 3
 """Squares a piece of a line passes; each piece has one color."""
@@ -251,15 +249,7 @@ class Shadow:
 
 
 def shadow(pygame: ModuleType, camera: Camera, size: tuple[int, int], scale: float, floor: float) -> Shadow:
-    """A soft round shadow on the floor below the camera's target.
-
-    Args:
-        pygame: The module.
-        camera: Whose pixels those of the picture are.
-        size: Of the picture, pixels.
-        scale: 1 for the paper's machine.
-        floor: z of the floor, m.
-    """
+    """A soft round shadow on the floor (z, m) below the camera's target; scale 1: the paper's machine."""
     x, y = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5, indexing="ij")
     sight = np.stack([x - camera.center[0], y - camera.center[1], np.full_like(x, camera.focal)], axis=-1)
     rays = sight @ camera.axes

@@ -40,6 +40,8 @@ from .kernels.reward import reward_of, vec_terms
 from .options import TaskOptions
 
 Array = NDArray[Any]
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class Base:
@@ -122,15 +124,7 @@ NOTHING, CORE, FRAME, ALL = range(4)
 
 
 class BatchArrays:
-    """The arrays of a batch, as attributes named like the fields of :class:`~.kernels.Arrays`.
-
-    Args:
-        n: Environments.
-        action_size: Entries of an action.
-        layout: Of the observations.
-        memory: Low-passed cues of every sample of every drive, see :func:`~.memory.low_passed`.
-        device: Where kernels work on them.
-    """
+    """The arrays of a batch, as attributes named like the fields of :class:`~.kernels.episode.Arrays`."""
 
     def __init__(
         self, n: int, action_size: int, layout: Layout, memory: NDArray[np.float32], device: Any
@@ -180,13 +174,7 @@ def rules_of(
 
 
 class Launches:
-    """What a batch launches.
-
-    Args:
-        simulator: The machines, whose state each step replaces.
-        arrays: Of the batch.
-        rules: From :func:`rules_of`.
-    """
+    """The recorded launches of a batch; each step replaces the simulator's state."""
 
     def __init__(self, simulator: Simulator, arrays: BatchArrays, rules: Any) -> None:
         self._simulator = simulator
@@ -225,9 +213,6 @@ class Launches:
         n, device = self._simulator.n, self._simulator.device
         self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)
 
-
-Mask = NDArray[np.bool_]
-Floats = NDArray[np.float64]
 
 _CONSTANT: Final = ("bounds", "memory")
 """Arrays that are what they were when the batch was made."""

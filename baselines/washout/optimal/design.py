@@ -338,14 +338,7 @@ def _weights(*sizes: float) -> Matrix:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The regulators of all channels; see ``channels`` for what goes in and comes out.
-
-    Args:
-        surge: Surge and pitch.
-        sway: Sway and roll.
-        heave: Heave.
-        yaw: Yaw.
-    """
+    """The regulators of all channels; surge goes with pitch, sway with roll."""
 
     surge: Regulator
     sway: Regulator

@@ -374,11 +374,7 @@ class View:
 def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[float, float]) -> Any:
     """The kernel's form of a layout, but for what machines can do.
 
-    Args:
-        layout: Of the observation.
-        seen: Its options.
-        dt: Time step, s.
-        noise: Standard deviations of specific force, m/s^2, and angular velocity, rad/s, in the cab.
+    ``noise`` has the standard deviations of specific force, m/s^2, and angular velocity, rad/s, in the cab.
     """
     view: Any = View()
     view.frame = layout.frame

@@ -242,7 +242,7 @@ def wider(family: Family) -> tuple[Coordinate, ...]:
         (evolution, "GUARDS", 12),
         (method, "TRY_EVERY", 4),
         (search_module, "LIMIT_SLOPE", 1.0),
-        (search_module, "version", lambda package: "99.0"),
+        (search_module, "package_version", lambda: "99.0"),
         (cma, "__version__", "99.0"),
     ],
 )
