@@ -105,9 +105,9 @@ def test_an_old_name_is_answered_with_the_new_one():
 def test_files_are_read_by_their_ending(tmp_path):
     with pytest.raises(DataError, match=r"there is no such file|cannot be read"):
         make_policy("missing.yaml", PAPER)
-    (tmp_path / "policy.zip").write_bytes(b"PK")
+    (tmp_path / "policy.pkl").write_bytes(b"PK")
     with pytest.raises(DataError, match=r"not a policy; .* one of .*\.yaml"):
-        make_policy(tmp_path / "policy.zip", PAPER)
+        make_policy(tmp_path / "policy.pkl", PAPER)
     (tmp_path / "mine.yaml").write_text("algorithm: mpc\n")
     assert make_policy(tmp_path / "mine.yaml", PAPER).name == "mine"
 
