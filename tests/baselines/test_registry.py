@@ -17,6 +17,8 @@ from motion_cueing.envs.platform import get_platform
 
 from ..repository import ROOT
 
+pytestmark = pytest.mark.slow
+
 PAPER = get_platform("paper")
 
 CONTROLLER = """

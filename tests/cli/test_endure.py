@@ -18,6 +18,8 @@ from motion_cueing.evaluation.policies import make_policy
 
 from ..evaluation.studies.bends import PAPER
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 5.0
 ARGV = ["endure", "--policies", "no-motion", "classical", "--duration", str(SECONDS), "--envs", "2"]
 

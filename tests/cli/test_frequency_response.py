@@ -15,6 +15,8 @@ from motion_cueing.evaluation.frequency_response.reporting import amplitudes, lo
 from motion_cueing.evaluation.frequency_response.response import FrequencyResponse, FrequencyTest, Sinusoid
 from motion_cueing.evaluation.metrics import CUE_AXES
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_command_writes_everything_and_reads_it_again(tmp_path, capsys):
     out = tmp_path / "out"

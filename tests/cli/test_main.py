@@ -35,6 +35,8 @@ from motion_cueing.evaluation.trajectory import Trajectory
 
 from ..evaluation.synthetic import drive
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def simulator(monkeypatch):

@@ -11,6 +11,8 @@ from motion_cueing.cli.main import main
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.evaluation import Trajectory
 
+pytestmark = pytest.mark.slow
+
 MINE = """
 import numpy as np
 

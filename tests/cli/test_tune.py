@@ -23,6 +23,8 @@ from motion_cueing.train.training import Interrupt
 
 from ..baselines.drives import trace
 
+pytestmark = pytest.mark.slow
+
 HOUR = 3600.0
 
 

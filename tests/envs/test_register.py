@@ -13,6 +13,8 @@ from motion_cueing.envs import car, maneuvers, perception, platform
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.registry import Registry
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = '''
 """Things of another package, made of the project's."""
 

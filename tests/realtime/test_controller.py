@@ -17,6 +17,8 @@ from motion_cueing.realtime.watchdog import BrakeOptions
 
 from .bench import AT_ONCE, FLOATS, PAPER, REST, SENDER, Bench, lane_change
 
+pytestmark = pytest.mark.slow
+
 TRACE = lane_change()
 
 

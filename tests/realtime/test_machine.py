@@ -25,6 +25,8 @@ from motion_cueing.realtime.server import Endpoint
 
 from .bench import FLOATS, PAPER, Bench, lane_change
 
+pytestmark = pytest.mark.slow
+
 TRACE = lane_change()
 
 

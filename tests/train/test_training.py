@@ -14,6 +14,8 @@ from motion_cueing.train.training import Training
 
 from . import tiny
 
+pytestmark = pytest.mark.slow
+
 
 def stop_at(steps: int):
     """What a training tells, and Ctrl-C from ``steps`` on."""

@@ -17,6 +17,8 @@ from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 from ..envs.task.tasks import SHORT, drive
 
+pytestmark = pytest.mark.slow
+
 SIZE = (480, 270)
 PUSH = np.full(9, 0.4, dtype=np.float32)
 

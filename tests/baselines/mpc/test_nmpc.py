@@ -18,6 +18,8 @@ from motion_cueing.evaluation import measure
 from .machines import NODES, PAPER, quick
 from .test_policy import SLALOM, driven
 
+pytestmark = pytest.mark.slow
+
 NONE = np.zeros(0, dtype=np.intp)
 
 

@@ -26,6 +26,8 @@ from motion_cueing.evaluation.trajectory import Trajectory
 
 from .machines import NODES, PAPER, quick
 
+pytestmark = pytest.mark.slow
+
 
 def part(name: str, begin: float, seconds: float, fierce: float = 1.0) -> CueTrace:
     """Some seconds of a maneuver, its cues scaled about rest."""

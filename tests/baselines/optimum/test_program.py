@@ -17,6 +17,8 @@ from motion_cueing.baselines.symbolic import SymbolicMachine
 from motion_cueing.envs.perception import get_vestibular_model, vestibular_model_names
 from motion_cueing.envs.platform import get_platform
 
+pytestmark = pytest.mark.slow
+
 INTERVALS = 3
 
 

@@ -32,6 +32,8 @@ from motion_cueing.train.config import TrainingConfig
 
 from ..drives import trace
 
+pytestmark = pytest.mark.slow
+
 PAPER = get_platform("paper")
 START = load_washout("classical")
 SPACE = WashoutSpace(START)

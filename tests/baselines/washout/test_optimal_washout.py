@@ -39,6 +39,8 @@ from motion_cueing.evaluation import measure, rollout
 from ..drives import DT, boundless, trace
 from .memories import memories
 
+pytestmark = pytest.mark.slow
+
 PAPER = get_platform("paper")
 START = load_of("optimal", "optimal-washout")
 SPACE = WashoutSpace(START)

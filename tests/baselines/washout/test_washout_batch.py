@@ -24,6 +24,8 @@ from motion_cueing.evaluation import measure, rollout
 
 from ..drives import trace
 
+pytestmark = pytest.mark.slow
+
 PAPER = get_platform("paper")
 DRIVES = [
     trace(8.0, lambda t: np.column_stack([0.5 * np.sin(t), 1.2 * np.sin(0.8 * t)]), name="weave"),

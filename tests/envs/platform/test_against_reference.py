@@ -14,6 +14,8 @@ from ...reference import ReferenceSimulator
 from ...reference.comparison import adopt, differences, restless_drive
 from .platforms_under_test import PRESETS, sluggish, with_dynamics
 
+pytestmark = pytest.mark.slow
+
 AGREE = 1e-9  # SI units, every field
 DRIVE = restless_drive(2101)
 

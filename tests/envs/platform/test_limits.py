@@ -12,6 +12,8 @@ from motion_cueing.envs.platform import Platform
 from .platforms_under_test import PRESETS, sluggish
 from .storms import Watch, every_direction, simulator, storm
 
+pytestmark = pytest.mark.slow
+
 EXACT = 1e-9
 LAGGED = 1e-6
 BATCH = 256

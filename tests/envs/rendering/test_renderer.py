@@ -19,6 +19,8 @@ from motion_cueing.envs.rendering.renderer import Scene
 
 from .moments import SIZE, moment, weaving
 
+pytestmark = pytest.mark.slow
+
 PAPER = get_platform("paper")
 STAGE = round(SIZE[0] - PANEL_WIDTH * SIZE[1] / 720)
 """Pixels left of the panel."""

@@ -23,6 +23,8 @@ from motion_cueing.envs.task.unroll import TaskUnroll
 from .tasks import drive
 from .test_unroll import LinearPolicy, gradient_that_agrees
 
+pytestmark = pytest.mark.slow
+
 BUILD = PlatformRanges(
     travel=(0.3, 1.1),
     size=(0.4, 1.1),

@@ -24,6 +24,8 @@ from motion_cueing.evaluation.rollout import Rollout
 from ...train.agents import agent
 from ..studies.bends import PAPER
 
+pytestmark = pytest.mark.slow
+
 SHORT = Endurance(duration=7.0, machines=3)
 """The first three seconds of a drive are straight."""
 SEEDS = drive_seeds(5, 1)

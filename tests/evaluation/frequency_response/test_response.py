@@ -21,6 +21,8 @@ from motion_cueing.evaluation.frequency_response.response import FrequencyTest, 
 from motion_cueing.evaluation.metrics import CUE_AXES
 from motion_cueing.evaluation.policies import make_policy
 
+pytestmark = pytest.mark.slow
+
 DT = 0.01
 OPEN = HighPass()
 PAPER = get_platform("paper")

@@ -22,6 +22,8 @@ from motion_cueing.train.agents.files import FORMAT, checksum, read, write
 
 from . import agent
 
+pytestmark = pytest.mark.slow
+
 TASKS = {
     "default": (TaskOptions(), None),
     "preview": (
