@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
@@ -120,11 +122,14 @@ def test_the_log_is_a_table_and_tensorboards_events(tmp_path):
     assert events(tmp_path) == {"a": [(10, 1.5), (20, 2.5)], "b/c": [(20, -1.0)]}
 
 
-def test_what_came_after_a_checkpoint_is_dropped(tmp_path):
+def test_what_came_after_a_checkpoint_is_dropped(tmp_path, monkeypatch):
     first = TrainingLog(tmp_path)
     for steps in (10, 20, 30):
         first.write(steps, {"a": float(steps)})
     first.close()
+    # TensorBoard orders event files by names with whole seconds: a training goes on at least one later.
+    began = time.time
+    monkeypatch.setattr(time, "time", lambda: began() + 10.0)
     second = TrainingLog(tmp_path, 20)
     second.write(25, {"a": 7.0})
     second.close()
