@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import yaml
 
-from ..envs.errors import ConfigurationError, DataError, MotionCueingError, place, suggest, told
+from ..envs.errors import ConfigurationError, DataError, MotionCueingError, place, suggest, summary
 from ..envs.registry import Registry
 from ..envs.settings import preset_names, read_yaml
 
@@ -139,7 +139,7 @@ def _referenced(name: str, platform: Platform) -> Any:
     except Exception as error:  # It is a user's code.
         where = place(error)
         raise ConfigurationError(
-            f"policy {name}: {told(error)}" + (f" ({where})" if where else "")
+            f"policy {name}: {summary(error)}" + (f" ({where})" if where else "")
         ) from error
     return target
 

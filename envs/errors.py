@@ -105,7 +105,7 @@ def place(error: BaseException) -> str:
     return "".join(f"{Path(file).name}:{line}" for _, file, line in (own or frames)[-1:])
 
 
-def told(error: BaseException) -> str:
+def summary(error: BaseException) -> str:
     """An error of a user's code in one line: its type and message."""
     text = " ".join((error.msg if isinstance(error, SyntaxError) else str(error)).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -20,7 +20,7 @@ from ..baselines.interface import Machines
 from ..baselines.policy import OneEach, Policy, as_policy
 from ..envs.car import Car
 from ..envs.cues import CueTrace
-from ..envs.errors import ActionError, ConfigurationError, MotionCueingError, PolicyError, place, told
+from ..envs.errors import ActionError, ConfigurationError, MotionCueingError, PolicyError, place, summary
 from ..envs.perception import VestibularModel, get_vestibular_model
 from ..envs.platform import Platform, actuator_limits, get_platform
 from ..envs.settings import to_dict
@@ -68,7 +68,7 @@ class Actor:
             raise
         except Exception as error:  # It is a user's code.
             raise PolicyError(
-                f"{self._policy.name} raised {told(error)} at step {self._calls} ({place(error)})"
+                f"{self._policy.name} raised {summary(error)} at step {self._calls} ({place(error)})"
             ) from error
         seconds = time.perf_counter() - began
         if not isinstance(answer, tuple) or len(answer) != 2:
