@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from motion_cueing.baselines import ClassicalWashout, NoMotion
-from motion_cueing.baselines.washout.classical import policies
-from motion_cueing.baselines.washout.classical.policies import load_per_maneuver
+from motion_cueing.baselines.washout.classical import per_maneuver
+from motion_cueing.baselines.washout.classical.per_maneuver import load_per_maneuver
 from motion_cueing.cli.main import main
 from motion_cueing.envs.car import get_car
 from motion_cueing.envs.cues import CueTrace
@@ -141,7 +141,7 @@ def test_an_oracle_of_other_sets_is_refused(folder, monkeypatch, capsys):
     words = ("--policy", "classical-per-maneuver", "--maneuvers", "sine-with-dwell")
     assert record(*words) == 0
     edited = replace(load_per_maneuver("sine-with-dwell"), turntable_share=0.25)
-    monkeypatch.setattr(policies, "load_per_maneuver", lambda name: edited)
+    monkeypatch.setattr(per_maneuver, "load_per_maneuver", lambda name: edited)
     assert record(*words) == 2
     assert "holds drives of another controller" in capsys.readouterr().err
 
