@@ -209,8 +209,9 @@ class TaskPolicy(Policy):
         own = self.platform
         if own != platform:
             raise ConfigurationError(
-                f"{self.name} was made for the motion base {own.name!r}, not {platform.name!r}; evaluate it "
-                f"on {own.name!r}, or force it, in Python: policy.on(get_platform({platform.name!r}))"
+                f"{self.name} was made for the motion base {own.name!r}, not {platform.name!r}; take "
+                "an agent that observes its machine, such as 'learned-any', evaluate this one on "
+                f"{own.name!r}, or force it, in Python: policy.on(get_platform({platform.name!r}))"
             )
         return self
 
@@ -389,8 +390,12 @@ def as_policy(policy: Any, task: TaskOptions | None = None, base_policy: Any = N
     if isinstance(policy, type) or not any(
         callable(getattr(policy, name, None)) for name in ("predict", "for_drive")
     ):
+        if isinstance(policy, str):
+            what = repr(policy)
+        else:
+            what = f"the class {policy.__name__}" if isinstance(policy, type) else type(policy).__name__
         raise ConfigurationError(
-            f"{policy!r} is no policy: it has no method predict(observation, state, episode_start, "
+            f"{what} is no policy: it has no method predict(observation, state, episode_start, "
             "deterministic); give an object with one, or make_policy(name, platform)"
         )
     task = getattr(policy, "task", None) if task is None else task

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import yaml
 
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError, DataError, MotionCueingError, place, suggest, summary
 from ..envs.registry import Registry
 from ..envs.settings import preset_names
 
@@ -106,6 +106,13 @@ def is_reference(name: str) -> bool:
     return ":" in name
 
 
+def name_of_reference(name: str, platform: Platform) -> str:
+    """What the policy that ``module:Class`` or ``file.py:make`` stands for calls itself."""
+    from .policy import as_policy
+
+    return as_policy(_referenced(name, platform)).name or name.rpartition(":")[2]
+
+
 def _referenced(name: str, platform: Platform) -> Any:
     """An object of the user's; a class or function is called to make it.
 
@@ -116,29 +123,64 @@ def _referenced(name: str, platform: Platform) -> Any:
     """
     module, _, attribute = name.rpartition(":")
     try:
-        target = getattr(_import(module), attribute)
+        loaded = _import(module)
+        if not hasattr(loaded, attribute):
+            known = [one for one, value in vars(loaded).items() if callable(value) and one[0] != "_"]
+            raise ConfigurationError(f"{module} has no {attribute!r}. {suggest(attribute, known)}")
+        target = getattr(loaded, attribute)
         if inspect.isclass(target) or inspect.isroutine(target):
             first = next(iter(inspect.signature(target).parameters), None)
             target = target(platform) if first == "platform" else target()  # type: ignore[call-arg]
+    except MotionCueingError as error:
+        raise ConfigurationError(f"policy {name}: {error}") from error
     except Exception as error:  # It is a user's code.
-        raise ConfigurationError(f"policy {name}: {type(error).__name__}: {error}") from error
+        where = place(error)
+        raise ConfigurationError(
+            f"policy {name}: {summary(error)}" + (f" ({where})" if where else "")
+        ) from error
     return target
 
 
+_LOADED: Final[dict[tuple[Path, int, int], Any]] = {}
+"""Modules from files, by path, time of the last change and size: the code of a file runs once."""
+
+
 def _import(module: str) -> Any:
-    """A module by name or file."""
-    if not module.endswith(".py"):
-        return import_module(module)
-    if not Path(module).exists():
-        raise FileNotFoundError(f"{module}: there is no such file")
-    spec = spec_from_file_location(Path(module).stem, module)
-    assert spec is not None
-    assert spec.loader is not None
-    loaded = module_from_spec(spec)
-    # Dataclasses and pickles look for the module of their class.
-    sys.modules.setdefault(spec.name, loaded)
-    spec.loader.exec_module(loaded)
-    return loaded
+    """A module by name or file.
+
+    The current folder is put on the path, as by ``python -m``; for a file its own, as by ``python file.py``.
+
+    Raises:
+        ConfigurationError: there is none.
+    """
+    file = Path(module).resolve()
+    from_file = module.endswith(".py")
+    folder = str(file.parent if from_file else Path.cwd())
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    if not from_file:
+        try:
+            return import_module(module)
+        except ModuleNotFoundError as error:
+            # A module that the user's own imports and that is missing is another matter.
+            if error.name is None or not f"{module}.".startswith(f"{error.name}."):
+                raise
+            raise ConfigurationError(
+                f"no module {error.name!r} in the current folder or among the installed packages"
+            ) from None
+    if not file.is_file():
+        raise ConfigurationError(f"{module}: there is no such file")
+    key = file, file.stat().st_mtime_ns, file.stat().st_size
+    if key not in _LOADED:
+        spec = spec_from_file_location(file.stem, file)
+        assert spec is not None
+        assert spec.loader is not None
+        loaded = module_from_spec(spec)
+        # Dataclasses and pickles look for the module of their class.
+        sys.modules.setdefault(spec.name, loaded)
+        spec.loader.exec_module(loaded)
+        _LOADED[key] = loaded
+    return _LOADED[key]
 
 
 def _no_motion(platform: Platform) -> Policy:

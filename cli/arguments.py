@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -45,6 +46,21 @@ def option(metavar: str, **others: Any) -> Parameter:
     """
     options = {"metavar": metavar, **others}
     return Parameter(**{name: value for name, value in options.items() if hasattr(Parameter, name)})
+
+
+def with_flags(message: str, names: Iterable[str]) -> str:
+    """A message with options in place of the fields it names: ``--gaps bridge`` for ``gaps='bridge'``.
+
+    Args:
+        message: Of a library.
+        names: Fields that are options. One without an underscore may be a plain word, unless a value follows.
+    """
+    for name in names:
+        flag = "--" + name.replace("_", "-")
+        message = re.sub(rf"(?<![\w-]){name}='?([\w.+-]+)'?", rf"{flag} \1", message)
+        if "_" in name:
+            message = re.sub(rf"(?<![\w-]){name}(?!\w)", flag, message)
+    return message
 
 
 def several(metavar: str, **others: Any) -> Parameter:
@@ -154,7 +170,7 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
     A file is never labeled as a shipped policy: normalized scores refer to those.
     """
     from ..evaluation.benchmark import benchmark_policies
-    from ..evaluation.policies import default_policies, is_reference, policy_names
+    from ..evaluation.policies import default_policies, is_reference, name_of_reference, policy_names
     from ..evaluation.suite import labels
 
     known = policy_names()
@@ -164,7 +180,9 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
         for name in (benchmark_policies(known) if given == BENCHMARK else [given])
     ]
     stems = [
-        name.rpartition(":")[2] if is_reference(name) else _stem("policy", name, [*known, BENCHMARK])
+        name_of_reference(name, platform)
+        if is_reference(name)
+        else _stem("policy", name, [*known, BENCHMARK])
         for name in expanded
     ]
     return {label: name for name, label in labels(expanded, stems, known).items()}

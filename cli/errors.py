@@ -22,7 +22,8 @@ from cyclopts.argument import Argument
 from cyclopts.exceptions import ConsumeMultipleError
 
 from ..envs.errors import ConfigurationError
-from .arguments import whole_number
+from ..envs.settings import message_of
+from .arguments import whole_number, with_flags
 
 _GOES_ON: Final = "--resume is not needed now: a command goes on from what is in --out"
 OLD_FLAGS: Final[Mapping[str, Mapping[str, str]]] = {
@@ -117,11 +118,15 @@ def _wrong(argument: Argument, found: str) -> str:
 
 def _of_configuration(error: pydantic.ValidationError, arguments: Iterable[Argument]) -> str:
     """What a configuration says of its first wrong field, which is an option here."""
+    arguments = list(arguments)
     wrong = error.errors()[0]
     flag = "--" + str(wrong["loc"][0]).replace("_", "-")
     argument = next((one for one in arguments if flag in one.names), None)
     found = str(wrong["input"])
-    message = wrong["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+    fields = [name[2:].replace("-", "_") for name in _flags(arguments)]
+    message = with_flags(message_of(wrong).replace("Input should be", "must be"), fields)
+    if wrong["type"] in ("too_short", "too_long"):
+        return f"{flag} {message}."
     if argument is not None and wrong["type"].endswith(("_parsing", "literal_error")):
         return _wrong(argument, found)
     return f"{flag} {message}, found {found}."

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 from cyclopts import Parameter
 
-from ..envs.errors import ConfigurationError
+from ..envs.errors import ConfigurationError, DataError
 from ..envs.logs.signals import ImportOptions, parse_columns
 from ..envs.storage import check_file, write_bytes
-from .arguments import Whole, option, several
+from .arguments import Whole, option, several, with_flags
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +64,10 @@ def run(command: ImportCommand) -> int:
 
     columns, units = parse_columns(command.columns)
     name = command.out.name.removesuffix(".gz").removesuffix(".csv")
-    imported = import_log(command.file, columns, units=units, options=command.conversion, name=name)
+    try:
+        imported = import_log(command.file, columns, units=units, options=command.conversion, name=name)
+    except DataError as error:
+        raise DataError(with_flags(str(error), [one.name for one in fields(ImportOptions)])) from None
     imported.trace.to_csv(command.out, decimals=command.decimals)
     print("\n".join(imported.findings.lines()))
     print(f"{command.out}: {len(imported.trace)} samples, {imported.trace.duration:.1f} s")

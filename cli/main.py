@@ -255,7 +255,10 @@ def _complain(program: str, message: str, status: int) -> int:
 
 
 def _dispatch(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help"):
+    if arguments[:1] in (["-h"], ["--help"], ["help"]) and len(arguments) > 1:
+        # `motion-cueing help evaluate` is `motion-cueing evaluate --help`.
+        arguments = [arguments[1], "--help"]
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(overview())
         return SUCCESS if arguments else BAD_ARGUMENTS
     name, rest = arguments[0], arguments[1:]

@@ -261,13 +261,23 @@ def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
         ", ".join(f"{package} {version}" for package, version in versions().items()),
         f"{spent} simulated in {search.status.steps} steps (budget {options.budget:g} h, and what was begun "
         f"until the next trial on all drives), seed {options.seed}",
-        *_scores(f"on the {many} of the search", search.objective, options.start, tuned),
+        *_scores(f"on the {many} of the search", search.objective, options.start, tuned)[0],
     ]
+    warning = []
     if "train" in options.maneuvers:
         held_out = _held_out(search)
-        notes += _scores(f"on {len(held_out.drives)} random drives held out", held_out, options.start, tuned)
+        where = f"on {len(held_out.drives)} random drives held out"
+        lines, (before, after) = _scores(where, held_out, options.start, tuned)
+        notes += lines
+        if after > before:
+            warning.append(
+                f"WARNING: {where}, {name} is WORSE than {options.start.name}, where the search began: cost "
+                f"{after:.3f} instead of {before:.3f} ({goal}, and more for limits met). "
+                f"Simulate more --hours on more --drives, or keep {options.start.name}."
+            )
     at_bounds = list(search.space.at_bounds(tuned))
     notes.append(f"at a bound of the search: {', '.join(at_bounds) or 'nothing'}")
+    notes += warning
     text = yaml.safe_dump(to_dict(tuned), sort_keys=False)
     write_text(_out(command), "".join(f"# {note}\n" for note in notes) + text)
     print("\n".join([str(_out(command)), *(f"  {note}" for note in notes[3:])]))
@@ -283,11 +293,15 @@ def _held_out(search: Search) -> Objective:
     return Objective(drives, given.platform, given.measure, given.threads, _spared(options, drives))
 
 
-def _scores(where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout) -> list[str]:
+def _scores(
+    where: str, objective: Objective, start: AnyWashout, tuned: AnyWashout
+) -> tuple[list[str], list[float]]:
+    """A line about either set, and their costs, which the search minimizes."""
     scores = objective.evaluate([start, tuned])
-    return [
+    lines = [
         f"{where}: {name} J {scores.cue_error[i]:.3f}, perceived {scores.perceived_error[i]:.3f}, "
         f"{100.0 * scores.at_limit[i]:.3f} % of the time at a limit, "
         f"{100.0 * scores.violation[i]:.3f} % where none may be met"
         for i, name in enumerate((start.name, tuned.name))
     ]
+    return lines, [float(cost) for cost in scores.cost]

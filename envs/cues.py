@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError
+from .errors import DataError, reason
 from .storage import write_bytes, write_text
 
 Floats = NDArray[np.float64]
@@ -233,7 +233,7 @@ def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, 
     missing = [name for name in names if name not in header]
     if missing:
         raise DataError(f"{path}: missing column {', '.join(missing)}; found {', '.join(header)}")
-    return {name: _numbers(path, name, [row[header.index(name)] for _, row in rows]) for name in names}
+    return {name: _numbers(path, name, header.index(name), rows) for name in names}
 
 
 def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -244,10 +244,18 @@ def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]
         reader = csv.reader(io.StringIO(text, newline=""))
         rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, EOFError, zlib.error, csv.Error, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read ({error})") from None
+        raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     if len(rows) < 2:
         raise DataError(f"{path}: empty; expected a header row and data rows")
     header = [cell.strip() for cell in rows[0][1]]
+    separator = next((mark for mark in ";\t" if len(header) == 1 and mark in header[0]), None)
+    if separator is not None:
+        raise DataError(
+            f"{path}: the separator is {separator!r}; save the file with commas between the columns, and "
+            "points in the numbers"
+        )
+    if all(map(_is_number, header)):
+        raise DataError(f"{path}: the first row must be the names of the columns, found numbers")
     repeated = {name for name in header if header.count(name) > 1}
     if repeated:
         raise DataError(f"{path}: column {', '.join(sorted(repeated))} occurs more than once")
@@ -257,11 +265,19 @@ def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]
     return header, rows[1:]
 
 
-def _numbers(path: str | Path, name: str, cells: list[str]) -> Floats:
+def _numbers(path: str | Path, name: str, place: int, rows: list[tuple[int, list[str]]]) -> Floats:
+    for line, row in rows:
+        if row[place].strip() and not _is_number(row[place]):
+            raise DataError(f"{path}: line {line}, column {name}: {row[place]!r} is no number")
+    return np.array([float(row[place]) if row[place].strip() else np.nan for _, row in rows])
+
+
+def _is_number(cell: str) -> bool:
     try:
-        return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
-    except ValueError as error:
-        raise DataError(f"{path}: column {name}: {error}") from None
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _check_table(path: str | Path, table: Mapping[str, Floats]) -> None:

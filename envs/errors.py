@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import sysconfig
+import traceback
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -31,6 +34,10 @@ class DataError(MotionCueingError, ValueError):
 
 class ActionError(MotionCueingError, ValueError):
     """An action that is not nine finite numbers."""
+
+
+class PolicyError(MotionCueingError, RuntimeError):
+    """A policy that raised an error of its own; the message says in which step, and where in its code."""
 
 
 class UnknownNameError(MotionCueingError, KeyError):
@@ -68,4 +75,37 @@ def suggest(name: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
     if near:
         return "Did you mean " + " or ".join(near) + "?"
-    return "Known: " + ", ".join(names) + "."
+    return "Known: " + (", ".join(names) or "none") + "."
+
+
+def reason(error: Exception) -> str:
+    """Why a file cannot be read, without the numbers of the operating system."""
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    return error.strerror or str(error) if isinstance(error, OSError) else str(error)
+
+
+def place(error: BaseException) -> str:
+    """File and line of an error, ``file.py:7``: the last line of a user's code on the way to it."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{Path(error.filename).name}:{error.lineno}"
+    frames = [
+        (frame.f_globals.get("__name__", ""), frame.f_code.co_filename, line)
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        if not frame.f_code.co_filename.startswith("<")
+    ]
+    library = sysconfig.get_path("stdlib")
+    own = [
+        (name, file, line)
+        for name, file, line in frames
+        if not name.startswith("motion_cueing.")
+        and "site-packages" not in file
+        and not file.startswith(library)
+    ]
+    return "".join(f"{Path(file).name}:{line}" for _, file, line in (own or frames)[-1:])
+
+
+def summary(error: BaseException) -> str:
+    """An error of a user's code in one line: its type and message."""
+    text = " ".join((error.msg if isinstance(error, SyntaxError) else str(error)).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

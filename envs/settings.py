@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeVar, get_args, get_type_hints
 
@@ -17,7 +17,7 @@ from pydantic import AliasChoices, ConfigDict, Field, TypeAdapter, ValidationErr
 from pydantic.dataclasses import dataclass
 from typing_extensions import dataclass_transform
 
-from .errors import ConfigurationError, DataError, UnknownNameError, suggest
+from .errors import ConfigurationError, DataError, UnknownNameError, reason, suggest
 from .storage import write_text
 
 _STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
@@ -98,6 +98,16 @@ def describe(error: ValidationError, cls: type[Any]) -> str:
     return "; ".join(_describe_one(dict(item), cls) for item in error.errors())
 
 
+def message_of(item: Mapping[str, Any]) -> str:
+    """What Pydantic says of one wrong field, in the words of a user."""
+    if item["type"] in ("too_short", "too_long"):
+        counts = item["ctx"]
+        least = item["type"] == "too_short"
+        bound = f"at least {counts['min_length']}" if least else f"at most {counts['max_length']}"
+        return f"must have {bound} entries, found {counts['actual_length']}"
+    return str(item["msg"]).removeprefix("Value error, ")
+
+
 def _known_fields(cls: type[Any], path: tuple[int | str, ...]) -> list[str]:
     """Fields of the innermost configurations on the way to ``path``."""
     found = [cls]
@@ -130,10 +140,11 @@ def _describe_one(item: dict[str, Any], cls: type[Any]) -> str:
         return f"field {path!r} is missing"
     if item["type"] == "multiple_argument_values":
         return f"field {path!r} is given twice, by its place and by its name"
-    message = str(item["msg"]).removeprefix("Value error, ")
+    message = message_of(item)
     text = f"field {path!r}: {message}" if path else message
     # The check of a whole configuration says itself what it found.
     whole = item["type"] == "value_error" and (not path or isinstance(item["input"], dict))
+    whole |= item["type"] in ("too_short", "too_long")
     return text if whole else f"{text} (found {item['input']!r})"
 
 
@@ -164,7 +175,7 @@ def read_yaml(path: str | Path) -> object:
         text = Path(path).read_text(encoding="utf-8")
         return yaml.safe_load(text)
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read ({error})") from None
+        raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     except yaml.YAMLError as error:
         raise DataError(f"{path}: not YAML ({_yaml_problem(error, text)})") from None
 

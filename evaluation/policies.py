@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .. import baselines
 from ..baselines import describe_policy, make_policy, policy_names
-from ..baselines.registry import is_reference
+from ..baselines.registry import is_reference, name_of_reference
 from ..train import agents
 from ..train.agents import find_agent, is_agent
 
@@ -20,6 +20,7 @@ __all__ = [
     "is_agent",
     "is_reference",
     "make_policy",
+    "name_of_reference",
     "policy_names",
 ]
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 from pydantic import JsonValue
 from typing_extensions import Self
 
-from ..envs.errors import DataError
+from ..envs.errors import DataError, reason
 from ..envs.provenance import now, package_version, plain, versions
 from ..envs.settings import configuration, from_dict, renamed, to_dict
 from ..envs.storage import write_text
@@ -58,7 +58,7 @@ class Saved:
         try:
             values = json.loads(Path(path).read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-            raise DataError(f"{path}: cannot be read as {cls.what} ({error})") from None
+            raise DataError(f"{path}: cannot be read as {cls.what} ({reason(error)})") from None
         schema = values.get("schema") if isinstance(values, dict) else None
         oldest = cls.version if cls.oldest is None else cls.oldest
         if not isinstance(schema, int) or not oldest <= schema <= cls.version:

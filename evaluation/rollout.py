@@ -20,7 +20,7 @@ from ..baselines.interface import Machines
 from ..baselines.policy import OneEach, Policy, as_policy
 from ..envs.car import Car
 from ..envs.cues import CueTrace
-from ..envs.errors import ActionError, ConfigurationError
+from ..envs.errors import ActionError, ConfigurationError, MotionCueingError, PolicyError, place, summary
 from ..envs.perception import VestibularModel, get_vestibular_model
 from ..envs.platform import Platform, actuator_limits, get_platform
 from ..envs.settings import to_dict
@@ -57,11 +57,19 @@ class Actor:
 
         Raises:
             ActionError: the policy returned something else than numbers of this shape and a state.
+            PolicyError: the policy raised an error of its own.
         """
         begins = np.full(self._shape[0], self._calls == 0)
         self._calls += 1
         began = time.perf_counter()
-        answer: Any = self._policy.predict(observation, self._state, begins, deterministic=True)
+        try:
+            answer: Any = self._policy.predict(observation, self._state, begins, deterministic=True)
+        except MotionCueingError:
+            raise
+        except Exception as error:  # It is a user's code.
+            raise PolicyError(
+                f"{self._policy.name} raised {summary(error)} at step {self._calls} ({place(error)})"
+            ) from error
         seconds = time.perf_counter() - began
         if not isinstance(answer, tuple) or len(answer) != 2:
             raise ActionError(
@@ -69,8 +77,14 @@ class Actor:
                 f"{type(answer).__name__}"
             )
         action, self._state = self._numbers(answer[0]), answer[1]
-        if self._finite:
-            known = np.isfinite(action)
+        known = np.isfinite(action)
+        if not known.all():
+            if not self._finite:
+                machine, entry = np.argwhere(~known)[0]
+                raise ActionError(
+                    f"the action of {self._policy.name} at step {self._calls} is not finite: "
+                    f"entry {entry} is {action[machine, entry]}"
+                )
             self.not_finite += ~known.all(axis=1)
             action = np.where(known, action, 0.0)
         return action, seconds
@@ -284,6 +298,7 @@ def rollout(
 
     Raises:
         ActionError: the policy returned something else than as many finite numbers as expected and a state.
+        PolicyError: the policy raised an error of its own.
         ConfigurationError: an argument is of the wrong type, or the policy was made for another time step,
             machine or perception model.
     """

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from rich.console import Console
 
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, MotionCueingError
+from ..envs.errors import ConfigurationError, MotionCueingError, summary
 from .metrics import Criteria, Metrics, measure
 from .reporting.text import how_many, print_note
 from .results import Failure
@@ -104,10 +104,7 @@ def run_suite(
 
 def explain(error: Exception) -> str:
     """One line: the message of our own errors, the type as well for any other."""
-    text = " ".join(str(error).split())
-    if isinstance(error, MotionCueingError):
-        return text
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return " ".join(str(error).split()) if isinstance(error, MotionCueingError) else summary(error)
 
 
 def labels(names: Sequence[str], stems: Sequence[str], reserved: Collection[str] = ()) -> dict[str, str]:

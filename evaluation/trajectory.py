@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..envs.errors import DataError
+from ..envs.errors import DataError, reason
 from ..envs.platform.kernels import ACTUATORS
 from ..envs.storage import write_bytes
 
@@ -245,8 +245,13 @@ def _read(path: str | Path) -> dict[str, Any]:
             return {name: file[name] for name in file.files}
     except DataError:
         raise
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise DataError(f"{path}: cannot be read as a trajectory ({error})") from None
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read as a trajectory ({reason(error)})") from None
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise DataError(
+            f"{path}: not a saved trajectory, or broken; give a .npz file that an evaluation or "
+            "`motion-cueing serve --log` wrote"
+        ) from None
 
 
 def _checked(label: str, name: str, values: Any, shape: tuple[int, ...]) -> NDArray[Any]:

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 
 from ..envs import provenance
-from ..envs.errors import ConfigurationError, DataError
+from ..envs.errors import ConfigurationError, DataError, reason
 from ..envs.settings import load, save
 from ..envs.storage import check_folder, replacing, write_text
 from .config import TrainingConfig
@@ -131,7 +131,7 @@ class RunFolder:
         try:
             run.sessions = list(json.loads((path / _RECORD).read_text(encoding="utf-8"))["sessions"])
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise DataError(f"{path / _RECORD}: cannot be read ({error})") from None
+            raise DataError(f"{path / _RECORD}: cannot be read ({reason(error)})") from None
         return run
 
     @classmethod

@@ -175,11 +175,11 @@ def _cut(log: RawLog, options: ImportOptions) -> RawLog:
     after = log.time > (math.inf if options.end_s is None else options.end_s)
     keep = ~(before | after)
     if not np.any(keep):
-        raise DataError(f"start_s {options.start_s:g}: no rows are left; the log has {len(log.time)}")
+        raise DataError(f"start_s={options.start_s:g}: no rows are left; the log has {len(log.time)}")
     signals = {name: values[keep] for name, values in log.signals.items()}
     if "course" in signals:
         signals["course"] = _unwrapped(signals["course"])
-    return RawLog(log.time[keep], signals, log.rows[keep])
+    return RawLog(log.time[keep], signals, log.rows[keep], log.time_unit)
 
 
 def _unwrapped(course: Floats) -> Floats:

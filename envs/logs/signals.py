@@ -115,11 +115,13 @@ class RawLog:
         time: (n,) s, starting at 0; may be broken in every way a log can be.
         signals: Each (n,), SI units, device axes; NaN where a cell was empty.
         rows: (n,) number of each data row in the file, from 1, for messages.
+        time_unit: Of the time column, for messages.
     """
 
     time: Floats
     signals: Mapping[str, Floats]
     rows: NDArray[np.intp]
+    time_unit: str = "s"
 
 
 def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -173,7 +175,7 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
     # Subtracting before scaling keeps the digits of stamps counted from 1970.
     time = (stamps - stamps[np.isfinite(stamps)][0]) * factors["time"]
     signals = {name: signal(name) for name in columns if name != "time"}
-    return RawLog(time, signals, np.arange(1, n + 1))
+    return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"))
 
 
 def _factors(columns: Mapping[str, str], units: Mapping[str, str]) -> dict[str, float]:
@@ -218,6 +220,9 @@ def _constant(column: str) -> float | None:
 _FILTER_ORDER: Final = 2
 """Butterworth order of one pass; forwards and backwards doubles it."""
 
+_USUAL_STEP_S: Final = (5e-4, 0.5)
+"""Steps of the logs that devices in cars write; others have probably another unit."""
+
 _SHORTEST_S: Final = 1.0
 """A shorter record has nothing to estimate from, and is all edge for the filter."""
 
@@ -258,7 +263,8 @@ def close_gaps(log: RawLog, options: ImportOptions) -> tuple[dict[str, Series], 
         name: _without_holes(name, (time, values[keep]), rows, options)
         for name, values in log.signals.items()
     }
-    bridged = sum(_bridge(name, stamps, options) for name, (stamps, _) in series.items())
+    likely = _likely_unit(time, log.time_unit)
+    bridged = sum(_bridge(name, stamps, options, likely) for name, (stamps, _) in series.items())
     steps = np.diff(time)
     cells = sum(int(np.isnan(values[keep]).sum()) for values in log.signals.values())
     return series, Timing(
@@ -283,7 +289,8 @@ def _kept_rows(log: RawLog, options: ImportOptions) -> NDArray[np.intp]:
     _refuse(options, log.rows[known[1:][steps == 0.0]], "time stamp repeats")
     kept = np.concatenate([known[:1], known[1:][steps > 0.0]])
     if len(kept) < 2 or time[kept[-1]] - time[kept[0]] < _SHORTEST_S:
-        raise DataError(f"the log is shorter than {_SHORTEST_S:g} s; check the unit of time")
+        likely = _likely_unit(time[kept], log.time_unit) or "; name a longer one"
+        raise DataError(f"the log is shorter than {_SHORTEST_S:g} s{likely}")
     return kept
 
 
@@ -298,20 +305,34 @@ def _without_holes(name: str, series: Series, rows: NDArray[np.intp], options: I
     return time[known], values[known]
 
 
-def _bridge(name: str, time: Floats, options: ImportOptions) -> int:
+def _likely_unit(time: Floats, unit: str) -> str:
+    """The unit that the time stamps probably have, as the end of a message; nothing if theirs will do."""
+    if len(time) < 2:
+        return ""
+    step, known = float(np.median(np.diff(time))), UNITS["time"]
+    least, most = _USUAL_STEP_S
+    if least <= step <= most:
+        return ""
+    likely = [one for one, factor in known.items() if least <= step / known[unit] * factor <= most]
+    said = f"; the steps of the time are {step:.3g} s: is its unit {unit}?"
+    return f"{said} It looks like {likely[0]} (time=COLUMN:{likely[0]})" if likely else said
+
+
+def _bridge(name: str, time: Floats, options: ImportOptions, likely: str) -> int:
     steps = np.diff(time)
     long = steps > options.longest_step_s
     if options.gaps == "refuse" and np.any(long):
         at = int(np.argmax(long))
         raise DataError(
-            f"gap of {steps[at]:.3g} s in {name} at {time[at]:.3f} s (longest_step_s "
-            f"{options.longest_step_s:g}); set gaps to bridge, or leave it out with start_s or end_s"
+            f"gap of {steps[at]:.3g} s in {name} at {time[at]:.3f} s "
+            f"(longest_step_s={options.longest_step_s:g})"
+            + (likely or "; set gaps='bridge', or leave it out with start_s or end_s")
         )
     if steps.max() > options.longest_gap_s:
         at = int(np.argmax(steps))
         raise DataError(
             f"gap of {steps[at]:.3g} s in {name} at {time[at]:.3f} s is too long to bridge "
-            f"(longest_gap_s {options.longest_gap_s:g}); leave it out with start_s or end_s"
+            f"(longest_gap_s={options.longest_gap_s:g})" + (likely or "; leave it out with start_s or end_s")
         )
     return int(long.sum())
 
@@ -319,7 +340,7 @@ def _bridge(name: str, time: Floats, options: ImportOptions) -> int:
 def _refuse(options: ImportOptions, rows: NDArray[np.intp], what: str) -> None:
     if options.gaps == "refuse" and len(rows):
         raise DataError(
-            f"{what} at data row {rows[0]} ({len(rows)} in all); set gaps to bridge, or mend the log"
+            f"{what} at data row {rows[0]} ({len(rows)} in all); set gaps='bridge', or mend the log"
         )
 
 

@@ -163,6 +163,12 @@ def _by_maneuver(title: str, results: Results, column: str, text: Callable[[Any]
     return TextTable(title, header, tuple(rows))
 
 
+def _all_of(results: Results) -> str:
+    """What means over the suite are over, in words."""
+    count = min((score.maneuvers for score in results.scores), default=len(results.maneuvers))
+    return "One drive" if count == 1 else f"All {count} drives"
+
+
 def suite_table(results: Results) -> TextTable:
     """The policies over the suite, best first."""
     scored = any(
@@ -181,7 +187,7 @@ def suite_table(results: Results) -> TextTable:
     ]
     scores = SCORES.values() if scored else ()
     header = ("policy", "mean J", "mean perceived J", *scores, "best on", "worst maneuver")
-    return TextTable("The whole suite", header, tuple(rows), (0,))
+    return TextTable(_all_of(results), header, tuple(rows), (0,))
 
 
 def print_results(console: Console, results: Results) -> None:
@@ -191,7 +197,8 @@ def print_results(console: Console, results: Results) -> None:
     if results.scores:
         print_table(console, suite_table(results))
     for verdict in results.verdicts:
-        name = "Over the whole suite" if verdict.maneuver == "all" else verdict.maneuver
+        everywhere = verdict.maneuver == "all"
+        name = f"Over {_all_of(results).lower()}" if everywhere else verdict.maneuver
         console.print(f"[bold]{escape(name)}[/bold]: {escape(' '.join(verdict.sentences))}", highlight=False)
     counted = [
         (policy, maneuver, counts)

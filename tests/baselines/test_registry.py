@@ -130,7 +130,7 @@ def test_an_object_of_ones_own_by_module_or_file(tmp_path, monkeypatch):
         assert make_policy(f"{module}:ready", PAPER).name == "class"
         with pytest.raises(ConfigurationError, match="no method predict"):
             make_policy(f"{module}:broken", PAPER)
-        with pytest.raises(ConfigurationError, match="has no attribute 'missing'"):
+        with pytest.raises(ConfigurationError, match="has no 'missing'"):
             make_policy(f"{module}:missing", PAPER)
     with pytest.raises(ConfigurationError, match="there is no such file"):
         make_policy(str(tmp_path / "none.py:Mine"), PAPER)

@@ -78,7 +78,7 @@ def test_the_benchmark_skips_what_knows_no_sinusoids_and_goes_on_after_a_failure
     assert main([*quick("benchmark"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
     assert "skipped classical-per-maneuver: classical-per-maneuver has a set for each" in shown
-    assert "failed adaptive: RuntimeError: tired" in shown
+    assert "failed adaptive: Tired raised RuntimeError: tired at step 1" in shown
     assert [one.policy for one in load_json(tmp_path / "frequency-response.json")] == ["no-motion"]
 
 

@@ -93,10 +93,10 @@ def test_bad_input_writes_nothing(log: Path, tmp_path: Path, capsys: pytest.Capt
     [
         ("--cutoff-hz", "0", "--cutoff-hz must be greater than 0, found 0"),
         ("--cutoff-hz", "nan", "--cutoff-hz must be a finite number, found nan"),
-        ("--cutoff-hz", "50", "--cutoff-hz must be below half of rate_hz, 50 Hz, found 50"),
+        ("--cutoff-hz", "50", "--cutoff-hz must be below half of --rate-hz, 50 Hz, found 50"),
         ("--rate-hz", "0", "--rate-hz must be greater than or equal to 2, found 0"),
         ("--rate-hz", "1e9", "--rate-hz must be less than or equal to 1000, found 1e9"),
-        ("--rate-hz", "9", "--cutoff-hz must be below half of rate_hz, 4.5 Hz, found 5.0"),
+        ("--rate-hz", "9", "--cutoff-hz must be below half of --rate-hz, 4.5 Hz, found 5.0"),
         ("--gravity-m-s2", "0", "--gravity-m-s2 must be greater than 0, found 0"),
     ],
 )
@@ -164,3 +164,55 @@ def test_the_log_is_never_overwritten(log: Path) -> None:
     assert log.read_bytes() == before
     with pytest.raises(DataError, match="cannot be read"):
         run(parsed("missing.csv", "--columns", *TEXTS, "--out", "cues.csv"))
+
+
+def plain_log(path: Path, step: float = 0.01, separator: str = ",", header: bool = True) -> list[list[str]]:
+    """Rows of a car that stands for 4 s, written to a file."""
+    rows = [["t", "ax", "ay", "az", "p", "q", "r"]] if header else []
+    rows += [[f"{step * i:g}", "0", "0", "-9.81", "0", "0", "0"] for i in range(400)]
+    path.write_text("".join(separator.join(row) + "\n" for row in rows))
+    return rows
+
+
+PLAIN = ["time=t", "force_x=ax", "force_y=ay", "force_z=az", "rate_x=p", "rate_y=q", "rate_z=r"]
+
+
+@pytest.mark.parametrize(
+    ("how", "unit", "told"),
+    [
+        ({"step": 10.0}, "s", "is its unit s? It looks like ms (time=COLUMN:ms)"),
+        ({"step": 1e4}, "s", "It looks like us"),
+        (
+            {"step": 0.01},
+            "ms",
+            "the steps of the time are 1e-05 s: is its unit ms? It looks like s",
+        ),
+        ({"separator": ";"}, "s", "the separator is ';'; save the file with commas"),
+        ({"header": False}, "s", "the first row must be the names of the columns, found numbers"),
+    ],
+)
+def test_a_log_of_another_kind_is_refused_with_what_to_do(how, unit, told, tmp_path, capsys) -> None:
+    plain_log(tmp_path / "log.csv", **how)
+    words = [f"time=t:{unit}", *PLAIN[1:]]
+    out = tmp_path / "cues.csv"
+    assert main(["import", str(tmp_path / "log.csv"), "--columns", *words, "--out", str(out)]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_complaints_name_the_options_of_the_command_line(tmp_path, capsys) -> None:
+    log = tmp_path / "log.csv"
+    rows = plain_log(log)
+    words = ["import", str(log), "--columns", *PLAIN, "--out", str(tmp_path / "cues.csv")]
+    rows[20][1] = "abc"
+    log.write_text("".join(",".join(row) + "\n" for row in rows))
+    assert main(words) == 2
+    assert "line 21, column ax: 'abc' is no number" in capsys.readouterr().err
+    del rows[20:120]
+    log.write_text("".join(",".join(row) + "\n" for row in rows))
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert "(--longest-step-s 0.2); set --gaps bridge, or leave it out with --start-s or --end-s" in said
+    assert main([*words, "--gaps", "bridge"]) == 2
+    assert "give --yaw-deg, or name a column" in capsys.readouterr().err
+    assert main(["import", "nowhere.csv", *words[2:]]) == 2
+    assert capsys.readouterr().err.endswith("nowhere.csv: cannot be read (there is no such file)\n")

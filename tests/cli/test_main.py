@@ -335,7 +335,10 @@ HEADER = (
         ),
         (HEADER + "0.1,0,0,-9.81,0,0,0\n0,0,0,-9.81,0,0,0\n", "time does not increase at sample 1"),
         (HEADER + "0,0,0,-9.81,0,0,0\n0.1,0,0\n", "line 3 has 3 cells"),
-        (HEADER + "0,0,0,-9.81,0,0,0\n0.1,x,0,-9.81,0,0,0\n", "could not convert string to float"),
+        (
+            HEADER + "0,0,0,-9.81,0,0,0\n0.1,x,0,-9.81,0,0,0\n",
+            "line 3, column specific_force_x_m_s2: 'x' is no number",
+        ),
     ],
 )
 def test_bad_cues_exit_2_before_anything_is_driven(content, told, tmp_path, capsys):
@@ -464,3 +467,44 @@ def test_results_are_json_for_other_tools(simulator, cue_file, tmp_path):
     main(["evaluate", "--maneuvers", str(cue_file), "--out", str(tmp_path / "out")])
     values = json.loads((tmp_path / "out" / "results.json").read_text())
     assert values["maneuvers"]["bend"]["classical"]["cue_error"] > 0.0
+
+
+@pytest.mark.parametrize("words", [["help", "evaluate"], ["-h", "evaluate"], ["--help", "evaluate"]])
+def test_help_of_a_command_is_found_either_way(words, capsys):
+    assert main(words) == 0
+    found = capsys.readouterr().out
+    assert main(["evaluate", "--help"]) == 0
+    assert found == capsys.readouterr().out
+
+
+def test_help_without_a_command_is_the_overview_and_of_no_command_a_complaint(capsys):
+    assert main(["help"]) == 0
+    assert "commands:" in capsys.readouterr().out
+    assert main(["help", "evalute"]) == 2
+    assert "Did you mean evaluate" in capsys.readouterr().err
+
+
+def test_the_help_of_a_command_without_options_shows_none(capsys):
+    assert main(["list", "--help"]) == 0
+    assert "LISTCOMMAND" not in capsys.readouterr().out.upper()
+
+
+def test_means_say_over_how_many_drives_they_are(simulator, cue_file, tmp_path, capsys):
+    words = [
+        "evaluate",
+        "--policies",
+        "classical",
+        "no-motion",
+        "--out",
+        str(tmp_path / "out"),
+        "--maneuvers",
+    ]
+    assert main([*words, str(cue_file)]) == 0
+    assert "One drive" in capsys.readouterr().out
+    second = tmp_path / "second.csv"
+    second.write_bytes(cue_file.read_bytes())
+    assert main([*words, str(cue_file), str(second)]) == 0
+    told = capsys.readouterr().out
+    assert "All 2 drives" in told
+    assert "Over all 2 drives:" in told
+    assert "whole suite" not in told

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
+from motion_cueing.baselines import make_policy
+from motion_cueing.cli.arguments import find_policies
 from motion_cueing.cli.main import main
 from motion_cueing.envs.cues import CueTrace
+from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import Trajectory
 
 pytestmark = pytest.mark.slow
@@ -24,6 +28,24 @@ class Nudge:
 
 class Mute:
     pass
+
+def make(platform):
+    policy = Nudge()
+    policy.name = "nudge-of-" + platform.name
+    return policy
+
+class Wild(Nudge):
+    value = float("nan")
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        step = (state or 0) + 1
+        action = np.zeros((*np.shape(observation)[:-1], 9))
+        action[..., 2] = self.value if step == 4 else 0.0
+        return action, step
+
+class Crash(Nudge):
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        step = (state or 0) + 1
+        return np.zeros(9)[9 if step == 3 else slice(None)], step
 
 class Broken:
     def __init__(self):
@@ -93,14 +115,65 @@ def test_it_is_told_when_its_file_has_changed_that_drives_are_driven_anew(folder
 @pytest.mark.parametrize(
     ("policy", "told"),
     [
-        ("mine.py:Mute", "is no policy: it has no method predict"),
-        ("mine.py:Broken", "policy mine.py:Broken: RuntimeError: out of order"),
-        ("mine.py:Nuge", "policy mine.py:Nuge: AttributeError"),
-        ("nowhere.py:Nudge", "policy nowhere.py:Nudge: FileNotFoundError: nowhere.py: there is no such file"),
-        ("no.such.module:Nudge", "policy no.such.module:Nudge: ModuleNotFoundError"),
+        ("mine.py:Mute", ": Mute is no policy: it has no method predict"),
+        ("mine.py:Broken", "policy mine.py:Broken: RuntimeError: out of order (mine.py:33)"),
+        ("mine.py:Nuge", "policy mine.py:Nuge: mine.py has no 'Nuge'. Did you mean Nudge"),
+        ("nowhere.py:Nudge", "policy nowhere.py:Nudge: nowhere.py: there is no such file"),
+        ("no.such.module:Nudge", "policy no.such.module:Nudge: no module 'no' in the current folder"),
     ],
 )
 def test_what_is_wrong_with_it_is_told_in_one_line(policy, told, folder, capsys):
     assert main(["evaluate", "--policies", policy, *DRIVE, "--out", "out"]) == 2
     assert told in capsys.readouterr().err
     assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("policy", "told"),
+    [
+        ("mine.py:Wild", "failed short, Wild: the action of Wild at step 4 is not finite: entry 2 is nan"),
+        (
+            "mine.py:Crash",
+            "Crash raised IndexError: index 9 is out of bounds for axis 0 with size 9 at step 3",
+        ),
+    ],
+)
+def test_a_failed_drive_says_the_step_and_the_line(policy, told, folder, capsys):
+    assert main(["evaluate", "--policies", policy, *DRIVE, "--out", "out"]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert told in said
+    assert "Crash" not in policy or "at step 3 (mine.py:29)" in said
+
+
+def test_a_module_of_the_current_folder_is_found_and_a_file_finds_its_neighbors(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.path", list(sys.path))
+    for module in ("beside_a", "beside_b"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    (tmp_path / "deeper").mkdir()
+    (tmp_path / "beside_a.py").write_text(MINE)
+    (tmp_path / "deeper" / "beside_b.py").write_text(MINE)
+    (tmp_path / "deeper" / "file.py").write_text("from beside_b import Nudge\n")
+    monkeypatch.chdir(tmp_path)
+    platform = get_platform("paper")
+    assert list(find_policies(["beside_a:Nudge", "deeper/file.py:Nudge"], platform)) == ["Nudge", "Nudge-2"]
+
+
+def test_a_factory_is_named_as_its_policy_names_itself(folder):
+    platform = get_platform("paper")
+    assert find_policies(["mine.py:make"], platform) == {"nudge-of-paper": "mine.py:make"}
+
+
+def test_a_file_runs_once(folder):
+    (folder / "counted.py").write_text(MINE + "print('run')\nopen('runs', 'a').write('x')\n")
+    for _ in range(2):
+        make_policy("counted.py:Nudge", get_platform("paper"))
+    assert (folder / "runs").read_text() == "x"
+
+
+def test_a_file_that_is_no_drive_is_refused_in_plain_words(folder, capsys):
+    for file, told in (("nowhere.npz", "there is no such file"), ("mine.py", "not a saved trajectory")):
+        assert main(["evaluate", "--replays", file, "--out", "out"]) == 2
+        said = capsys.readouterr().err
+        assert told in said
+        assert "Errno" not in said
+        assert "pickle" not in said

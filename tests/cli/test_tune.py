@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from motion_cueing.baselines import make_policy
-from motion_cueing.baselines.tuning.search import Status, TuningOptions, load_record
+from motion_cueing.baselines.tuning.search import Search, Status, TuningOptions, load_record
 from motion_cueing.baselines.washout import load_washout
 from motion_cueing.baselines.washout.families import algorithm_of, load_parameters
 from motion_cueing.cli.main import main
@@ -224,3 +224,20 @@ def test_progress_is_a_bar_on_a_terminal_and_some_lines_elsewhere():
     lines = shown[False].splitlines()
     assert 10 < len(lines) <= 21
     assert lines[-1].split() == ["10", "h", "best", "2.0000", "(100", "steps)"]
+
+
+@pytest.mark.parametrize("worse", [True, False])
+def test_a_set_that_is_worse_on_the_drives_held_out_is_announced_last(worse, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    start = "classical-tuned" if worse else "est1"
+    made = load_washout("classical" if worse else "classical-tuned")
+    monkeypatch.setattr(
+        Search, "result", lambda self, name, about: replace(made, name=name, description=about)
+    )
+    words = ["tune", "--algorithm", "classical", "--start", start, "--drives", "1", "--hours", "0.001"]
+    assert main([*words, "--out", "mine.yaml"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.lstrip().startswith("WARNING") == worse
+    if worse:
+        assert "mine is WORSE than classical-tuned, where the search began" in last
+        assert f"# {last.strip()}" in (tmp_path / "mine.yaml").read_text()

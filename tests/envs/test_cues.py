@@ -234,7 +234,7 @@ NEXT = "0.01,0,0,-9.81,0,0,0"
         (f"{HEADER}\n{ROW}\n", "at least 2"),
         (f"{HEADER}\n{ROW}\n{NEXT},1\n", "line 3 has 8 cells, the header has 7"),
         (f"{HEADER}\n\n{ROW}\n0.01,0\n", "line 4 has 2 cells"),
-        (f"{HEADER}\n{ROW}\n0.01,zero,0,0,0,0,0\n", "column specific_force_x_m_s2: could not convert"),
+        (f"{HEADER}\n{ROW}\n0.01,zero,0,0,0,0,0\n", "column specific_force_x_m_s2: '.*' is no number"),
         (
             f"{HEADER}\n{ROW}\n0.01,,0,0,0,0,0\n",
             "line 3, column specific_force_x_m_s2: not a finite number; fill",

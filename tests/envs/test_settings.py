@@ -27,7 +27,7 @@ import motion_cueing.evaluation
 from motion_cueing.baselines.washout import load_washout, washout_presets
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.maneuvers import get_maneuver
-from motion_cueing.envs.platform import Turntable
+from motion_cueing.envs.platform import Turntable, get_platform
 from motion_cueing.envs.settings import (
     NonNegative,
     Positive,
@@ -345,3 +345,12 @@ def test_an_unknown_field_within_another_type_suggests_the_inner_fields(
     path.write_text(text)
     with pytest.raises(ConfigurationError, match=f"unknown field {message}"):
         load(Assembly, path)
+
+
+def test_too_few_entries_name_the_field_and_the_number() -> None:
+    hexapod = get_platform("paper").hexapod
+    with pytest.raises(ConfigurationError) as raised:
+        dataclasses.replace(hexapod, upper_joints=hexapod.upper_joints[:5])
+    assert str(raised.value) == "Hexapod: field 'upper_joints': must have at least 6 entries, found 5"
+    with pytest.raises(ConfigurationError, match="'lower_joints': must have at most 6 entries, found 12"):
+        dataclasses.replace(hexapod, lower_joints=hexapod.lower_joints * 2)

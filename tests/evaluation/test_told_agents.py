@@ -63,7 +63,9 @@ def test_the_command_evaluates_it_on_another_machine(tmp_path, monkeypatch, caps
     assert "any" in capsys.readouterr().out
     agent(name="one").save("one.safetensors")
     assert main([*words[:2], "one.safetensors", *words[3:], "--out", "other"]) == 2
-    assert "was made for the motion base 'paper'" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "was made for the motion base 'paper'" in said
+    assert "such as 'learned-any'" in said
 
 
 def test_it_runs_in_the_loop_on_any_machine():

@@ -161,7 +161,7 @@ def test_policies_that_cannot_be_served_are_refused():
 
     for policy, told in [
         (Foreknowing(), "seer must know the drive"),
-        (Broken(), "broken fails with a car that stands: RuntimeError: no"),
+        (Broken(), "broken fails with a car that stands: broken raised RuntimeError: no at step 1"),
         (ClassicalWashout(dt=0.02), "time step"),
         (Feedback(TaskOptions(platform="nads-1")), "made for the motion base"),
     ]:

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ....envs.errors import DataError
+from ....envs.errors import DataError, reason
 from ....envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ....envs.simulator.simulator import N_AXES
 from ....envs.storage import write_bytes, write_text
@@ -146,7 +146,7 @@ def load_index(folder: str | Path) -> Index:
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read ({error})") from None
+        raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     except json.JSONDecodeError as error:
         raise DataError(f"{path}: not JSON ({error})") from None
     if not isinstance(values, dict) or values.get("format") != FORMAT:
