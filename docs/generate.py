@@ -19,6 +19,7 @@ import types
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
+from unittest.mock import patch
 
 DOCS = Path(__file__).resolve().parent
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]-*.md"))
@@ -163,12 +164,12 @@ def configuration_tables() -> dict[str, str]:
 
 def command_line() -> str:
     """Every command with its help."""
-    os.environ.update(COLUMNS="110", NO_COLOR="1", TERM="dumb")
     from motion_cueing.cli.main import COMMANDS, main
 
     def help_of(*words: str) -> str:
         out = io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
+        plain = patch.dict(os.environ, COLUMNS="110", NO_COLOR="1", TERM="dumb")
+        with plain, contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
             main([*words, "--help"])
         return re.sub(r"\x1b\[[0-9;]*m", "", out.getvalue()).strip()
 
