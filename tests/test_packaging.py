@@ -182,7 +182,7 @@ EXTRA_OF = {
 
 
 def undeclared(path: Path, text: str, declared: dict[str, set[str]]) -> list[str]:
-    """Imports of a file that nobody is told to install for it."""
+    """Imports of a file that no declared dependency provides."""
     extras = {extra for folder, extra in EXTRA_OF.items() if path.is_relative_to(folder)}
     wrong = []
     for name, deferred in imports(ast.parse(text)):

@@ -1,4 +1,4 @@
-"""Solves that went wrong are told, one line a policy."""
+"""Solves that went wrong are reported, one line a policy."""
 
 from __future__ import annotations
 

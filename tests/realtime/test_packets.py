@@ -1,4 +1,4 @@
-"""Packets: what goes out comes in, and what is broken is told from what is whole."""
+"""Packets: round trips, and refusal of broken ones."""
 
 from __future__ import annotations
 

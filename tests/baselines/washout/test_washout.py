@@ -57,7 +57,7 @@ def test_without_filters_the_driver_feels_the_car():
     drive = trace(12.0, weave, yawing)
     felt = rollout(ClassicalWashout(open_washout()), drive, boundless())
     assert not felt.limits_active.any()
-    # The action of a sample acts until the next one: what is felt is one sample old.
+    # The action of a sample acts until the next one: simulator cues are one sample old.
     error = felt.f_simulator[1:] - felt.f_reference[:-1]
     assert np.abs(error[5:]).max() < 0.03
     assert np.abs(felt.w_simulator[2:] - felt.w_reference[:-2])[5:].max() < 0.01

@@ -1,4 +1,4 @@
-"""Environments whose machines differ, and policies that are told which they have."""
+"""Environments whose platforms differ, and policies whose observation describes the platform."""
 
 from __future__ import annotations
 

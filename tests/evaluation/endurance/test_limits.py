@@ -1,4 +1,4 @@
-"""Limits are told from the true motion alone, by legs computed anew."""
+"""Limits are checked on the true motion alone, with legs computed anew."""
 
 from __future__ import annotations
 

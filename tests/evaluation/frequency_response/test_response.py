@@ -131,7 +131,7 @@ def test_no_motion_answers_to_nothing():
 
 
 class Told:
-    """Answers to the drive it is told, not to what it sees: heaves by a part of what is to come."""
+    """Answers to the drive it is given, not to its observation: heaves by a part of what is to come."""
 
     name = "told"
 
@@ -157,7 +157,7 @@ def test_a_policy_that_knows_the_drive_has_no_delay():
 
 
 class Alone:
-    """A washout that is driven as one that is told the drive: by itself."""
+    """A washout that is driven as one that is given the drive: by itself."""
 
     name = "alone"
 

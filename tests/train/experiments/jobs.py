@@ -39,7 +39,7 @@ def seeds(folder: Path, config: TrainingConfig, count: int) -> list[TrainingJob]
 
 
 class Heard:
-    """Keeps what it is told; may press Ctrl-C once so many jobs have been heard of."""
+    """Keeps its messages; may press Ctrl-C after so many jobs have reported."""
 
     def __init__(self, press_after: int | None = None) -> None:
         self.statuses: dict[str, list[int]] = {}

@@ -1,4 +1,4 @@
-"""Agents that are told their machine, on all of them."""
+"""Agents whose observation describes the platform, on all platforms."""
 
 from __future__ import annotations
 

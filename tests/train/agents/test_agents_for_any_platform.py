@@ -1,4 +1,4 @@
-"""Training over machines of other builds, and the agents that are told theirs."""
+"""Training with randomized platforms, and the agents whose observation describes theirs."""
 
 from __future__ import annotations
 
