@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import re
 import shlex
@@ -15,12 +16,24 @@ import yaml
 from motion_cueing.cli.main import COMMANDS, parse
 from motion_cueing.envs.errors import MotionCueingError
 from motion_cueing.envs.provenance import package_version
+from motion_cueing.envs.registry import Registry
 
 from ..envs.logs import synthetic_log
 from ..repository import ROOT
 from ..train import agents
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def registries_as_before():
+    """Pages register names of their own; a registry has no way to forget, so its entries are put back."""
+    registries = [one for one in gc.get_objects() if isinstance(one, Registry)]
+    entries = [dict(one._entries) for one in registries]
+    yield
+    for one, before in zip(registries, entries, strict=True):
+        one._entries = before
+
 
 DOCS = ROOT / "docs"
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
