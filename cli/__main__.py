@@ -1,4 +1,4 @@
-"""``python -m motion_cueing.evaluation``: the command line; without a subcommand it evaluates."""
+"""``python -m motion_cueing.cli``: the command line; without a command it evaluates."""
 
 import sys
 
