@@ -9,6 +9,7 @@ the reason why one policy is better than another.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import product
 from typing import Final, Literal
@@ -39,11 +40,13 @@ def normalized_score(value: float, baseline: float | None, optimum: float | None
         optimum: J of the policy whose score is 1, if it was driven.
 
     Returns:
-        None where one of the two is missing, or where the baseline is not the worse of the two.
+        None where one of the two is missing, where the baseline is not the worse of the two, or where their
+        gap is too small for a number.
     """
     if baseline is None or optimum is None or not baseline > optimum:
         return None
-    return (baseline - value) / (baseline - optimum)
+    score = (baseline - value) / (baseline - optimum)
+    return score if math.isfinite(score) else None
 
 
 def normalized_scores(
