@@ -174,6 +174,7 @@ class TaskInterface(Interface):
             task,
             platform=machines.platforms[0],
             vestibular=machines.vestibular.name,
+            reward=replace(task.reward, against_base=False),
             episode=EpisodeOptions(),
             randomization=RandomizationOptions(),
         )

@@ -12,14 +12,23 @@ import gymnasium
 from .cues import GRAVITY, CueTrace
 
 ENVIRONMENT_ID: Final = "motion_cueing/DrivingSimulator-v0"
-"""What ``gymnasium.make`` and ``gymnasium.make_vec`` know the environment by."""
+"""The raw task: nine accelerations at 100 Hz."""
 
-if ENVIRONMENT_ID not in gymnasium.registry:
-    gymnasium.register(
-        id=ENVIRONMENT_ID,
-        entry_point="motion_cueing.envs.task.environment:DrivingSimulator",
-        vector_entry_point="motion_cueing.envs.task.vector:DrivingSimulatorVector",
-    )
+ENVIRONMENTS: Final = {
+    ENVIRONMENT_ID: {},
+    "motion_cueing/Cueing-v0": {"task": "cueing"},
+    "motion_cueing/CueingPreview-v0": {"task": "cueing-preview"},
+}
+"""What ``gymnasium.make`` and ``gymnasium.make_vec`` know the environments by, and their arguments."""
+
+for _id, _arguments in ENVIRONMENTS.items():
+    if _id not in gymnasium.registry:
+        gymnasium.register(
+            id=_id,
+            entry_point="motion_cueing.envs.task.environment:DrivingSimulator",
+            vector_entry_point="motion_cueing.envs.task.vector:DrivingSimulatorVector",
+            kwargs=_arguments,
+        )
 
 __version__: str
 

@@ -194,6 +194,16 @@ def save(config: Any, path: str | Path) -> None:
     write_text(path, yaml.safe_dump(to_dict(config), sort_keys=False))
 
 
+def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """``below`` with what ``above`` sets; mappings within are merged alike."""
+    merged = dict(below)
+    for key, value in above.items():
+        inner = merged.get(key)
+        both = isinstance(inner, Mapping) and isinstance(value, Mapping)
+        merged[key] = merge(inner, value) if both else value  # type: ignore[arg-type]
+    return merged
+
+
 def preset_names(folder: Path) -> list[str]:
     """Names of the parameter sets in a folder."""
     return sorted(path.stem for path in folder.glob("*.yaml"))

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, JsonValue
 
-from ..baselines.washout import WashoutParameters, load_washout
+from ..baselines.washout.families import AnyWashout, load_parameters
 from ..envs.errors import ConfigurationError
 from ..envs.maneuvers import drive_seeds
-from ..envs.settings import Positive, configuration, from_dict, read_yaml
+from ..envs.settings import Positive, configuration, from_dict, merge, read_yaml
 from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomizationOptions, TaskOptions
 from .registry import algorithm_names, preset_of
 
@@ -132,8 +131,9 @@ class TrainingConfig:
     Args:
         algo: The algorithm, by name.
         task: The environment. ``task.episode.drives`` stays empty: only random drives are trained on.
-        base: Washout under the agent, where ``task.action.mode`` needs one: its parameters, a preset or a
-            YAML file; "classical" if none is named.
+        base: What acts under the agent, where ``task.action.mode`` needs that: parameters of a washout, or
+            the name or file of a washout, predictive control or an agent; default: ``task.action.base``,
+            or "classical".
         initial: Agent file whose network the training begins with; it sees and does the same.
         hyperparameters: Arguments of the algorithm.
         normalize: Running normalization.
@@ -151,7 +151,7 @@ class TrainingConfig:
 
     algo: str
     task: TaskOptions = TaskOptions()
-    base: WashoutParameters | str | None = None
+    base: AnyWashout | str | None = None
     initial: str | None = None
     hyperparameters: dict[str, JsonValue] = field(default_factory=dict)
     normalize: NormalizeOptions = NormalizeOptions()
@@ -225,7 +225,7 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
     config = from_dict(TrainingConfig, merged, str(path) if path is not None else f"--algorithm {name}")
     if isinstance(config.base, str) and Path(config.base).suffix in (".yaml", ".yml"):
         # The file may not be there any more when the training is resumed.
-        config = replace(config, base=load_washout(config.base))
+        config = replace(config, base=load_parameters(config.base))
     return config
 
 
@@ -239,13 +239,3 @@ def _fields(path: Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ConfigurationError(f"{path}: expected fields with values, found {type(values).__name__}")
     return values
-
-
-def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """``below`` with what ``above`` sets; mappings within are merged alike."""
-    merged = dict(below)
-    for key, value in above.items():
-        inner = merged.get(key)
-        both = isinstance(inner, Mapping) and isinstance(value, Mapping)
-        merged[key] = merge(inner, value) if both else value  # type: ignore[arg-type]
-    return merged

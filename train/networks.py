@@ -84,6 +84,7 @@ class TorchNetwork(nn.Module):
     def __init__(self, network: Network) -> None:
         super().__init__()
         self._squash, self._clip, self._normalizes = network.squash, network.clip, network.mean is not None
+        self._bound = network.bound
         for name, values in zip(("high", "low", "factor"), network.normalization, strict=True):
             self.register_buffer(name, torch.from_numpy(values.copy()))
         units = [weight.shape[0] for weight in network.weights]
@@ -92,12 +93,14 @@ class TorchNetwork(nn.Module):
         load_weights([*linear_layers(self.latent.hidden), self.head], network)
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
-        """Actions (n, k) in [-1, 1] for observations (n, size)."""
+        """Actions (n, k) within the bound for observations (n, size)."""
         if self._normalizes:
             high, low, factor = (self.get_buffer(name) for name in ("high", "low", "factor"))
             observation = torch.clamp((observation - high - low) * factor, -self._clip, self._clip)
         out: torch.Tensor = self.head(self.latent(observation))
-        return torch.tanh(out) if self._squash == "tanh" else torch.clamp(out, -1.0, 1.0)
+        if self._squash == "tanh":
+            return self._bound * torch.tanh(out)
+        return torch.clamp(out, -self._bound, self._bound)
 
 
 class Actor(nn.Module):
@@ -246,7 +249,13 @@ def start_as_spring_damper(actor: Actor, batch: Batch) -> None:
     moving = batch.usual_scale > 0.0
     gains[moving] /= batch.usual_scale[moving, None]
     gains[~moving] = 0.0
-    start_linear(actor, gains.astype(np.float32))
+    start_linear(actor, as_shown(gains, batch))
+
+
+def as_shown(gains: NDArray[np.float64], batch: Batch) -> Floats:
+    """Gains (k, frame) of what a batch shows and takes, for gains (9, frame) in the rows' physical scales."""
+    entries = [AXES.index(axis) for axis in batch.options.action.axes]
+    return (gains[entries] / batch.layout.gains[: batch.layout.frame]).astype(np.float32)
 
 
 # Normalization by a rollout. Rows of an observation are scaled to what can happen, and an action of 1 is all

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,9 +49,10 @@ class DrivingSimulatorTorch:
 
     Args:
         num_envs: Environments.
-        task: Everything that can be chosen; default: all defaults.
+        task: Everything that can be chosen, or the name or file of a task; default: all defaults.
         drives: Cue traces to drive instead of those of ``task.episode``.
-        base: The base policy of the action modes "residual" and "gains".
+        base: The base policy of the action modes "residual" and "gains", by name or file too; default:
+            ``action.base``.
         device: "cuda:0" and the like, or "cpu"; the same name for Warp and PyTorch.
         **fields: Fields of ``TaskOptions`` to replace, as dataclasses or dictionaries.
 
@@ -61,7 +63,7 @@ class DrivingSimulatorTorch:
     def __init__(
         self,
         num_envs: int,
-        task: TaskOptions | None = None,
+        task: TaskOptions | str | Path | None = None,
         *,
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,

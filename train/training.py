@@ -22,7 +22,7 @@ from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.episode import platform_of
 from .agents import Agent, Network, Record
-from .agents.agent import DEFAULT, base_parameters
+from .agents.agent import DEFAULT, base_of
 from .config import Measure, TrainingConfig
 from .logs import TrainingLog
 from .networks import Actor, start_as_spring_damper
@@ -72,6 +72,10 @@ def check_episodes(config: TrainingConfig, why: str) -> None:
     if config.task.episode.duration is None:
         raise ConfigurationError(
             "task.episode.duration must say how long an episode is, s; 20 is a good start"
+        )
+    if config.task.action.bound != 1.0:
+        raise ConfigurationError(
+            f"task.action.bound must be 1 for {config.algo}; change authority or largest"
         )
     if config.normalize.observation or config.normalize.reward:
         raise ConfigurationError(f"normalize must be off for {config.algo}: {why}")
@@ -250,7 +254,7 @@ class Training:
             initial=self._initial,
         )
         name = f"{self.run.path.resolve().name}-{kind}"
-        base = base_parameters(config.base, config.task)
+        base = base_of(config.base, config.task)
         return Agent(name, config.task, self.learner.network(), record, base)
 
     def checkpoint(self) -> Path:

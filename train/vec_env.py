@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -39,9 +40,10 @@ class DrivingSimulatorVecEnv(VecEnv):
 
     Args:
         num_envs: Environments.
-        task: Everything that can be chosen; default: all defaults.
+        task: Everything that can be chosen, or the name or file of a task; default: all defaults.
         drives: Cue traces to drive instead of those of ``task.episode``.
-        base: The base policy of the action modes "residual" and "gains".
+        base: The base policy of the action modes "residual" and "gains", by name or file too; default:
+            ``action.base``.
         device: "cpu" or a CUDA device of Warp.
         render_mode: "rgb_array", "human" (a window that shows the first environment), or None.
         render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
@@ -54,7 +56,7 @@ class DrivingSimulatorVecEnv(VecEnv):
     def __init__(
         self,
         num_envs: int,
-        task: TaskOptions | None = None,
+        task: TaskOptions | str | Path | None = None,
         *,
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,

@@ -6,23 +6,23 @@ Each kernel is a recorded launch with its arrays, once for each copy of the simu
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Mirror, real, vec9
 from ..cues import CueTrace
 from ..errors import ActionError, ConfigurationError, UnknownNameError
 from ..perception.models import get_vestibular_model
-from ..platform.kernels.step import AXES
 from ..platform.machines import Platform
-from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
+from .arrays import ALL, CORE, FRAME, NOTHING, BatchArrays, Launches, rules_of
+from .base import Base, RowsBase, Schedule, TaskBase, base_of
 from .episode import (
     DRIVE,
     MACHINE_STREAM,
+    cost_scales,
     draw,
     fill_episodes,
     key_of,
@@ -33,189 +33,13 @@ from .episode import (
     start_samples,
     uniform,
 )
-from .kernels.action import Mode, action_scale, action_scales
-from .kernels.episode import Arrays, Command, Rules, forget, look, play
-from .kernels.observation import Episode, Layout, ability_of, layout_of, low_passed, view_of
-from .kernels.reward import reward_of, vec_terms
+from .kernels.action import action_scale
+from .kernels.observation import layout_of, low_passed
 from .options import TaskOptions
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-
-class Base:
-    """The base policy of a batch, with its memory.
-
-    Args:
-        policy: The policy, or None. Mode "residual" needs ``predict`` (accelerations for observations);
-            mode "gains" needs ``gain_names`` and ``schedule(observation, gains, state, episode_start)``.
-            Its state must be None or an array with one row an environment.
-        mode: What actions mean.
-        n: Environments.
-
-    Raises:
-        ConfigurationError: the mode needs another policy than there is.
-    """
-
-    def __init__(self, policy: Any, mode: Mode, n: int) -> None:
-        self.policy = policy
-        self.residual, self.scheduled = mode == "residual", mode == "gains"
-        self.action_size = len(AXES)
-        if policy is not None and not (self.residual or self.scheduled):
-            raise ConfigurationError(f"base= is of no use with action.mode {mode!r}; leave it out")
-        try:
-            if self.residual:
-                self._predict = policy.predict
-            elif self.scheduled:
-                self._schedule, self.action_size = policy.schedule, len(policy.gain_names)
-        except AttributeError:
-            method = "predict" if self.residual else "schedule"
-            raise ConfigurationError(
-                f"action.mode {mode!r} needs base=, a policy with {method}(...)"
-            ) from None
-        self._begins = np.ones(n, dtype=bool)
-        self._state: Any = None
-
-    def begin(self, mask: NDArray[np.bool_]) -> None:
-        """Episodes begin in the masked environments."""
-        self._begins |= mask
-
-    def act(
-        self, observation: Array, out: Array, gains: Array | None, mask: NDArray[np.bool_] | None
-    ) -> None:
-        """Write what the policy does at observations (n, OBSERVATION_SIZE) into ``out`` (n, 9).
-
-        Args:
-            observation: The fixed rows.
-            out: Accelerations, m/s^2 and rad/s^2.
-            gains: (n, k) for a scheduled policy.
-            mask: (n,) the environments it acts in, the others stay as they are; default: all.
-        """
-        begins = self._begins.copy()
-        if self.scheduled:
-            action, state = self._schedule(observation, gains, self._state, begins)
-        else:
-            action, state = self._predict(observation, self._state, begins, deterministic=True)
-        action = np.reshape(action, out.shape)
-        if mask is None or self._state is None or state is None:
-            out[...], self._state = action, state
-            self._begins[...] = False
-            return
-        out[mask] = action[mask]
-        self._state = np.array(self._state)
-        self._state[mask] = np.asarray(state)[mask]
-        self._begins &= ~mask
-
-    def snapshot(self) -> Snapshot:
-        """The memory, for :meth:`restore`."""
-        state = {} if self._state is None else {"base_state": np.array(self._state)}
-        return {"base_begins": self._begins.copy(), **state}
-
-    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot."""
-        self._begins[...] = snapshot["base_begins"]
-        state = snapshot.get("base_state")
-        self._state = None if state is None else np.array(state)
-
-
-NOTHING, CORE, FRAME, ALL = range(4)
-"""Parts of an observation, as the kernels number them."""
-
-
-class BatchArrays:
-    """The arrays of a batch, as attributes named like the fields of :class:`~.kernels.episode.Arrays`."""
-
-    def __init__(
-        self, n: int, action_size: int, layout: Layout, memory: NDArray[np.float32], device: Any
-    ) -> None:
-        self.episode = Mirror(n, Episode, device)
-        self.begins = Mirror(n, wp.bool, device)
-        self.base = Mirror(n, vec9, device)
-        self.command = Mirror(n, Command, device)
-        self.terms = Mirror(n, vec_terms, device)
-        self.reward = Mirror(n, real, device)
-        self.terminated, self.truncated = Mirror(n, wp.bool, device), Mirror(n, wp.bool, device)
-        self.action = Mirror((n, action_size), wp.float32, device)
-        self.now = Mirror((n, action_size), wp.float32, device)
-        self.before = Mirror((n, action_size), wp.float32, device)
-        self.core = Mirror((n, OBSERVATION_SIZE), real, device)
-        self.fixed = Mirror((n, OBSERVATION_SIZE), real, device)
-        self.observation = Mirror((n, layout.size), wp.float32, device)
-        self.bounds = Mirror(layout.size, wp.float32, device)
-        self.bounds.view[...] = layout.bounds
-        self.bounds.push()
-        self.memory = Mirror(memory.shape, wp.float32, device)
-        self.memory.view[...] = memory
-        self.memory.push()
-
-    def for_kernels(self) -> Any:
-        """The kernels' form."""
-        arrays: Any = Arrays()
-        for name, mirror in vars(self).items():
-            setattr(arrays, name, mirror.array)
-        return arrays
-
-
-def rules_of(
-    options: TaskOptions, layout: Layout, platforms: Sequence[Platform], dt: float, device: Any
-) -> Any:
-    """What is the same for a whole batch, as the kernels read it."""
-    rules: Any = Rules()
-    rules.action = action_scales(platforms, options.action, device)
-    rules.reward = reward_of(options.reward, options.episode.terminate_on_failure)
-    noise = options.randomization.force_noise, options.randomization.rate_noise
-    rules.view = view_of(layout, options.observation, dt, noise)
-    if options.observation.machine:
-        abilities = np.array([ability_of(platform) for platform in platforms])
-        rules.view.abilities = wp.array(abilities, dtype=wp.float32, device=device)
-    rules.share, rules.dt = 1.0 / options.action.repeat, dt
-    return rules
-
-
-class Launches:
-    """The recorded launches of a batch; each step replaces the simulator's state."""
-
-    def __init__(self, simulator: Simulator, arrays: BatchArrays, rules: Any) -> None:
-        self._simulator = simulator
-        self._common = [rules, arrays.for_kernels()]
-        self._recorded: dict[tuple[Any, ...], Any] = {}
-
-    def play(self, first: bool, parts: int) -> None:
-        """A time step, the ``first`` of an action or a later one, and ``parts`` of the observations."""
-        simulator = self._simulator
-        key = ("play", first, parts, simulator.current)
-        if key not in self._recorded:
-            begin, end = simulator.copies[simulator.current], simulator.copies[1 - simulator.current]
-            *constants, _ = simulator.constants
-            self._record(key, play, [*self._common, *constants, int(first), parts, *begin, *end])
-        self._recorded[key].launch()
-        simulator.swap()
-
-    def look(self, only_begins: bool, parts: int) -> None:
-        """``parts`` of the observations, outside of a step."""
-        simulator = self._simulator
-        key = ("look", only_begins, parts, simulator.current)
-        if key not in self._recorded:
-            machines, _, drives, machine_of, drive_of, _ = simulator.constants
-            state, _ = simulator.copies[simulator.current]
-            arrays = [machines, drives, machine_of, drive_of]
-            self._record(key, look, [*self._common, *arrays, int(only_begins), parts, state])
-        self._recorded[key].launch()
-
-    def forget(self) -> None:
-        """Forget the actions where episodes begin."""
-        if ("forget",) not in self._recorded:
-            self._record(("forget",), forget, [self._common[1]])
-        self._recorded[("forget",)].launch()
-
-    def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> None:
-        n, device = self._simulator.n, self._simulator.device
-        self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)
-
-
-_CONSTANT: Final = ("bounds", "memory")
-"""Arrays that are what they were when the batch was made."""
 
 
 class Batch:
@@ -226,7 +50,8 @@ class Batch:
         options: Everything that can be chosen.
         drives: Cue traces to drive instead of those of ``options.episode``.
         platforms: Machines to draw from instead of those of ``options``.
-        base: The base policy, where ``options.action.mode`` needs one.
+        base: The base policy of the modes "residual" and "gains": a policy, its name or its file; default:
+            what ``options.action.base`` names.
         device: "cpu" or a CUDA device of Warp.
     """
 
@@ -252,30 +77,63 @@ class Batch:
             device=device,
         )
         self.platform = self.simulator.platforms[0]
-        self.base = Base(base, options.action.mode, n)
-        self.action_size = self.base.action_size
+        policy = base_of(base, options, self.platform)
+        self.action_size = len(policy.gain_names) if options.action.mode == "gains" else options.action.size
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
         memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
+        self.base = self._base(policy)
         platforms = self.simulator.platforms
         self.scales = np.array([action_scale(one, options.action) for one in platforms])
         self._pose_scales = np.array([pose_scale(one) for one in platforms])
         self.time_step = TIME_STEP * options.action.repeat
+        self._cost_scales = cost_scales(self.drives, options.reward)
         self._lengths = np.array([len(drive) for drive in self.drives])
         self._keys, self._episodes = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.int64)
         self.rules = rules_of(options, self.layout, platforms, TIME_STEP, self.simulator.device)
         self._launches = Launches(self.simulator, self.arrays, self.rules)
+        self._alone = self._base_alone(policy)
 
     def _library(self, drives: Sequence[CueTrace] | None) -> list[CueTrace]:
         if drives is None:
             drives = library_of(self.options.episode, self.options.randomization)
         return [drive.resampled(TIME_STEP) for drive in drives]
 
+    def _base(self, policy: Any) -> Base:
+        """The base policy as the batch needs it; one with a ``task`` sees its own environment."""
+        if policy is None:
+            return Base()
+        if self.options.action.mode == "gains":
+            return Schedule(policy, self.n)
+        if getattr(policy, "task", None) is None:
+            return RowsBase(policy, self.n)
+        return TaskBase(policy, self.options, self.simulator, self.drives, self.arrays)
+
+    def _base_alone(self, policy: Any) -> Batch | None:
+        """The base policy by itself in the same episodes, where the reward is against it."""
+        reward = self.options.reward
+        if not reward.against_base:
+            return None
+        if policy is None:
+            raise ConfigurationError(
+                "reward.against_base needs a base policy: action.mode 'residual' or 'gains'"
+            )
+        return Batch(
+            self.n,
+            replace(self.options, reward=replace(reward, against_base=False)),
+            drives=self.drives,
+            platforms=self.simulator.platforms,
+            base=policy,
+            device=str(self.simulator.device),
+        )
+
     def seed(self, mask: Mask, seeds: Sequence[int]) -> None:
         """Give the masked environments seeds (one for each environment of the batch), and start over."""
         chosen = np.flatnonzero(mask)
         self._keys[chosen] = [key_of(seeds[i]) for i in chosen.tolist()]
         self._episodes[chosen] = 0
+        if self._alone is not None:
+            self._alone.seed(mask, seeds)
 
     @property
     def scale(self) -> Floats:
@@ -306,6 +164,7 @@ class Batch:
         options = self.options
         first, last = start_samples(words, self._lengths[drive_of], options.episode, TIME_STEP)
         fill_episodes(self.arrays.episode.view, mask, words, last, options.randomization)
+        self.arrays.episode.view["cost_scale"][mask] = self._cost_scales[drive_of]
         self.arrays.episode.push()
         self._place(
             mask,
@@ -314,6 +173,8 @@ class Batch:
             sample=first,
             start=start_poses(words, self._pose_scales[machine_of], options.episode.platform_offset),
         )
+        if self._alone is not None:
+            self._alone.begin(mask, drive, machine)
 
     def _place(self, mask: Mask, **drawn: NDArray[Any]) -> None:
         """Put the masked environments where was drawn for them."""
@@ -345,27 +206,34 @@ class Batch:
     def play(self) -> Iterator[int]:
         """The same as :meth:`step`, with a stop after each time step of the action; to be run to its end."""
         repeat, base = self.options.action.repeat, self.base
-        gains = np.clip(self.arrays.action.pull(), -1.0, 1.0) if base.scheduled else None
-        # A base policy has the machine's time step: it acts anew within an action, too.
-        within = CORE if base.residual or base.scheduled else NOTHING
+        gains = np.clip(self.arrays.action.pull(), -1.0, 1.0) if base.before else None
+        # A base policy acts anew within an action, too; the last observation shows what it does next.
+        within = CORE if base.every == 1 else NOTHING
+        last = within if base.every and not base.before else ALL
         for k in range(repeat):
-            if base.scheduled:
+            if base.before:
                 self._act(gains)
-            self._launches.play(k == 0, within if k < repeat - 1 or base.residual else ALL)
-            if base.residual:
+            self._launches.play(k, within if k < repeat - 1 else last)
+            if base.every and not base.before and (k + 1) % base.every == 0:
                 self._act()
             yield k
-        if base.residual:
-            self._launches.look(False, FRAME)
+        if last != ALL:
+            self._launches.look(False, ALL if within == NOTHING else FRAME)
+        if self._alone is not None:
+            self._alone.step()
+            self.arrays.reward.pull()[...] -= self._alone.arrays.reward.pull()
+            self.arrays.reward.push()
 
     def observe(self, begins: Mask) -> None:
         """Make the observations of the environments new whose episode ``begins`` (n,)."""
         self._mark(begins)
         self._launches.look(True, CORE)
-        if self.base.residual:
+        if self.base.every and not self.base.before:
             self._act(mask=begins)
         self._launches.look(True, FRAME)
         self._mark(np.zeros(self.n, dtype=bool))
+        if self._alone is not None:
+            self._alone.observe(begins)
 
     def _act(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
         """Let the base policy act."""
@@ -374,10 +242,12 @@ class Batch:
 
     def snapshot(self) -> Snapshot:
         """Everything that changes, for :meth:`restore` of a batch made alike."""
-        arrays = {name: bytes_of(mirror.array) for name, mirror in self._changing()}
+        arrays = {name: bytes_of(mirror.array) for name, mirror in self.arrays.changing()}
         machines = {f"simulator.{name}": data for name, data in self.simulator.snapshot().items()}
         draws_made = {"keys": self._keys.copy(), "episodes": self._episodes.copy()}
-        return {**arrays, **machines, **draws_made, **self.base.snapshot()}
+        alone = {} if self._alone is None else self._alone.snapshot()
+        prefixed = {f"alone.{name}": data for name, data in alone.items()}
+        return {**arrays, **machines, **draws_made, **self.base.snapshot(), **prefixed}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot: the same actions then give the same bits.
@@ -385,19 +255,14 @@ class Batch:
         Raises:
             DataError: it is of another batch or version.
         """
-        for name, mirror in self._changing():
+        for name, mirror in self.arrays.changing():
             put_bytes(mirror.array, name, snapshot)
             mirror.pull()
-        prefix = "simulator."
-        self.simulator.restore(
-            {name.removeprefix(prefix): data for name, data in snapshot.items() if name.startswith(prefix)}
-        )
+        self.simulator.restore(_under("simulator.", snapshot))
         self._keys[...], self._episodes[...] = snapshot["keys"], snapshot["episodes"]
         self.base.restore(snapshot)
-
-    def _changing(self) -> list[tuple[str, Mirror]]:
-        """The arrays that change, by name."""
-        return [(name, mirror) for name, mirror in vars(self.arrays).items() if name not in _CONSTANT]
+        if self._alone is not None:
+            self._alone.restore(_under("alone.", snapshot))
 
     @property
     def commanded(self) -> NDArray[np.float64]:
@@ -406,7 +271,7 @@ class Batch:
 
     @property
     def clipped(self) -> NDArray[np.int32]:
-        """(n,) entries of the last action outside [-1, 1]."""
+        """(n,) entries of the last action beyond its bound."""
         return np.asarray(self.arrays.command.pull()["clipped"])
 
     def write(self, action: ArrayLike) -> None:
@@ -437,3 +302,8 @@ class Batch:
                 raise UnknownNameError("drive", str(name), known)
             chosen.append(int(name) if isinstance(name, int | np.integer) else known.index(label))
         return np.array(chosen, dtype=np.int32)
+
+
+def _under(prefix: str, snapshot: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The entries of a snapshot whose names begin with a prefix, without it."""
+    return {name.removeprefix(prefix): data for name, data in snapshot.items() if name.startswith(prefix)}

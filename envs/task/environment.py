@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium
@@ -15,11 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..cues import CueTrace
 from ..errors import ActionError, ConfigurationError, UnknownArgumentError, suggest
-from ..settings import from_dict
 from ..simulator.simulator import TIME_STEP
 from .batch import Batch
 from .kernels.reward import TERMS
-from .options import TaskOptions
+from .options import TaskOptions, load_task
 
 if TYPE_CHECKING:
     from ..rendering.renderer import Picture
@@ -42,17 +42,18 @@ def observation_space(batch: Batch) -> Space[Any]:
 
 
 def action_space(batch: Batch) -> Space[Any]:
-    """Of one environment: float32 in [-1, 1]."""
-    return Box(-1.0, 1.0, (batch.action_size,), dtype=np.float32)
+    """Of one environment: float32 within the bound of ``action``."""
+    bound = batch.options.action.bound
+    return Box(-bound, bound, (batch.action_size,), dtype=np.float32)
 
 
 def task_options(
-    task: TaskOptions | None, fields: dict[str, Any], arguments: Iterable[str] = ()
+    task: TaskOptions | str | Path | None, fields: dict[str, Any], arguments: Iterable[str] = ()
 ) -> TaskOptions:
-    """``task`` (default: all defaults) with some fields replaced; nested ones may be plain dictionaries.
+    """A task with some fields replaced; in a plain dictionary, the fields it names alone.
 
     Args:
-        task: Where to begin.
+        task: Where to begin: a task, its name or file; default: all defaults.
         fields: Fields to replace.
         arguments: Further keywords that the caller knows, for the message.
 
@@ -61,17 +62,12 @@ def task_options(
         ConfigurationError: a nested field is unknown, or one is of the wrong type or out of range.
     """
     known = [field.name for field in dataclasses.fields(TaskOptions)]
-    start = {} if task is None else {name: getattr(task, name) for name in known}
     for name in fields:
         if name not in (*known, *_BEFORE):
             raise UnknownArgumentError(
                 f"got an unexpected keyword argument {name!r}. {suggest(name, [*known, *arguments])}"
             )
-    return from_dict(
-        TaskOptions,
-        start | {_BEFORE.get(name, name): value for name, value in fields.items()},
-        "environment options",
-    )
+    return load_task(task, **{_BEFORE.get(name, name): value for name, value in fields.items()})
 
 
 def drive_option(options: dict[str, Any] | None, known: Sequence[str] = ("drive",)) -> Any:
@@ -152,9 +148,10 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
     **Version History.** v0: the first.
 
     Args:
-        task: Everything that can be chosen; default: all defaults.
+        task: Everything that can be chosen, or the name or file of a task; default: all defaults.
         drives: Cue traces to drive instead of those of ``task.episode``.
-        base: The base policy of the action modes "residual" and "gains".
+        base: The base policy of the action modes "residual" and "gains", by name or file too; default:
+            ``action.base``.
         render_mode: "rgb_array" (:meth:`render` gives a frame), "human" (a window, at the pace of the
             drive), or None; see ``docs/guides/films-and-pictures.md``.
         render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
@@ -173,7 +170,7 @@ class DrivingSimulator(gymnasium.Env[Observation, Action], EzPickle):
 
     def __init__(
         self,
-        task: TaskOptions | None = None,
+        task: TaskOptions | str | Path | None = None,
         *,
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,

@@ -7,6 +7,7 @@ once, and an environment's numbers do not depend on its neighbors.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Final
@@ -16,13 +17,15 @@ from numpy.typing import NDArray
 
 from ..car import Car, get_car
 from ..car.simulation import Plan, simulate
-from ..cues import CueTrace
+from ..cues import GRAVITY, CueTrace
 from ..errors import ConfigurationError
 from ..maneuvers import drive_seeds, get_maneuver, get_recording, recording_names
 from ..maneuvers.standard import LARGEST_OFFSET, off_path
 from ..platform.machines import UNLIMITED, ActuatorDynamics, Platform
 from ..platform.presets import get_platform
 from ..platform.randomization import random_platform
+from ..simulator.kernels.step import CueCost
+from .kernels.reward import RewardOptions
 from .options import EpisodeOptions, RandomizationOptions, TaskOptions
 
 Floats = NDArray[np.float64]
@@ -125,6 +128,18 @@ def fill_episodes(
     view["noise"][mask] = (words[:, NOISE] >> np.uint64(33)).astype(np.int32)
     view["force_gain"][mask], view["rate_gain"][mask] = gains.T
     view["actuator_gain"][mask] = 1.0 + options.actuator_gain * signed[:, ACTUATOR_GAINS]
+
+
+def cost_scales(drives: Sequence[CueTrace], options: RewardOptions) -> Floats:
+    """(n,) what rewards are divided by on each drive: 1 + ``standstill`` times J of standing still."""
+    return np.array([1.0 + options.standstill * standstill_cost(drive, options.zone) for drive in drives])
+
+
+def standstill_cost(drive: CueTrace, cost: CueCost) -> float:
+    """J of a machine that stands still: the mean square of the car's cues, over the indifference zone."""
+    force = (drive.specific_force + np.array([0.0, 0.0, GRAVITY])) / cost.force
+    rate = drive.angular_velocity / cost.rate
+    return float(np.mean(np.sum(force**2 + rate**2, axis=1)))
 
 
 _FRICTION_STREAM: Final = 1

@@ -1,17 +1,33 @@
-"""Options of the environment, as frozen dataclasses that load from YAML."""
+"""Options of the environment, as frozen dataclasses that load from YAML; whole tasks by name."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, Field
 
+from ..errors import ConfigurationError, suggest
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..perception.models import vestibular_model_names
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, load_platform, platform_names
 from ..platform.randomization import PlatformRanges
-from ..settings import NonNegative, Positive, check_names, check_range, configuration, renamed
+from ..settings import (
+    NonNegative,
+    Positive,
+    check_names,
+    check_range,
+    configuration,
+    from_dict,
+    merge,
+    preset_names,
+    read_yaml,
+    renamed,
+    to_dict,
+)
 from .kernels.action import ActionOptions
 from .kernels.observation import ObservationOptions
 from .kernels.reward import RewardOptions
@@ -120,3 +136,59 @@ class TaskOptions:
         if isinstance(self.platform, str):
             check_names("platform", [self.platform], [*platform_names(), *ablation_names()])
         check_names("vestibular model", [self.vestibular], vestibular_model_names())
+
+
+_PRESETS: Final = Path(__file__).parent / "presets"
+
+
+def task_names() -> list[str]:
+    """Names of the tasks that come with the package."""
+    return preset_names(_PRESETS)
+
+
+def load_task(task: TaskOptions | str | Path | None = None, **fields: Any) -> TaskOptions:
+    """A whole task, with some fields replaced.
+
+    Args:
+        task: The task, its name, or its YAML file; None for all defaults. A file may name under ``preset``
+            the task it begins with.
+        **fields: Fields of :class:`TaskOptions` to replace; in a mapping, the fields it names alone.
+
+    Raises:
+        DataError: the file cannot be read or is not YAML.
+        ConfigurationError: no task has this name, a field is unknown, of the wrong type or out of range.
+    """
+    if task is None or isinstance(task, TaskOptions):
+        start, source = task or TaskOptions(), "environment options"
+    else:
+        source = str(task)
+        start = _from_values(_values_of(task), source)
+    if not fields:
+        return start
+    return from_dict(TaskOptions, merged_task(start, fields), source)
+
+
+def merged_task(start: TaskOptions, fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a task with some replaced; in a mapping, the fields it names alone."""
+    merged: dict[str, Any] = {field.name: getattr(start, field.name) for field in dataclasses.fields(start)}
+    for name, value in fields.items():
+        if isinstance(value, Mapping) and dataclasses.is_dataclass(merged.get(name)):
+            value = merge(to_dict(merged[name]), value)
+        merged[name] = value
+    return merged
+
+
+def _values_of(task: str | Path) -> object:
+    if Path(task).suffix in (".yaml", ".yml"):
+        return read_yaml(task)
+    if str(task) not in task_names():
+        raise ConfigurationError(f"unknown task {str(task)!r}. {suggest(str(task), task_names())}")
+    return read_yaml(_PRESETS / f"{task}.yaml")
+
+
+def _from_values(values: object, source: str) -> TaskOptions:
+    """A task of the values in a file, which may name the one they change."""
+    if isinstance(values, Mapping) and "preset" in values:
+        rest = {name: value for name, value in values.items() if name != "preset"}
+        return load_task(str(values["preset"]), **rest)
+    return from_dict(TaskOptions, values, source)

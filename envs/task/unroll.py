@@ -48,6 +48,8 @@ class TaskUnroll:
             raise ConfigurationError(
                 f"action.mode {options.action.mode!r} has no gradients; one of {', '.join(_MODES)} has"
             )
+        if options.reward.floor is not None:
+            raise ConfigurationError("reward.floor must be None for gradients: where it holds there are none")
         self.batch, self.actions = batch, actions
         self.repeat = options.action.repeat
         self._allocate()
@@ -116,7 +118,7 @@ class TaskUnroll:
         *constants, _ = batch.simulator.constants
         i = k * self.repeat + step
         return [
-            batch.rules, batch.arrays.episode.array, *constants, int(step == 0),
+            batch.rules, batch.arrays.episode.array, *constants, step,
             self._taken[k + 1], self._taken[k], self._own[i], self._states[i], self._delays[i],
             self._own[i + 1], self._states[i + 1], self._delays[i + 1],
             self._terms, self._costs[k],

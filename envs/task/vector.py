@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,9 +43,10 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
 
     Args:
         num_envs: Environments.
-        task: Everything that can be chosen; default: all defaults.
+        task: Everything that can be chosen, or the name or file of a task; default: all defaults.
         drives: Cue traces to drive instead of those of ``task.episode``.
-        base: The base policy of the action modes "residual" and "gains".
+        base: The base policy of the action modes "residual" and "gains", by name or file too; default:
+            ``action.base``.
         autoreset_mode: When an ended environment begins anew; Gymnasium's default is with the next step.
         copy: Whether observations are copies; else each step overwrites those of the one before.
         device: "cpu" or a CUDA device of Warp.
@@ -68,7 +70,7 @@ class DrivingSimulatorVector(VectorEnv[NDArray[np.float32], NDArray[np.float32],
     def __init__(
         self,
         num_envs: int = 1,
-        task: TaskOptions | None = None,
+        task: TaskOptions | str | Path | None = None,
         *,
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,

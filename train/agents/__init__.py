@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...baselines.registry import POLICY_FILES, describe_policy, policy_names, register
+from ...baselines.registry import POLICY_FILES, describe_policy, make_policy, policy_names, register
 from ...envs.errors import DataError
 from .names import FOLDER, SUFFIX, agent_names, description_in, is_agent
 
@@ -36,6 +36,7 @@ __all__ = [
     "find_agent",
     "get_agent",
     "is_agent",
+    "make_policy",
     "policy_names",
     "register_agents",
 ]

@@ -14,17 +14,21 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...baselines.mpc.parameters import MpcParameters
 from ...baselines.policy import TaskPolicy
-from ...baselines.washout import ClassicalWashout, ScheduledWashout, WashoutParameters, load_washout
+from ...baselines.registry import make_policy
+from ...baselines.washout import ScheduledWashout, WashoutParameters
 from ...baselines.washout.classical.policies import KNOBS
+from ...baselines.washout.families import FAMILIES
+from ...baselines.washout.policy import make_washout
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
-from ...envs.platform.kernels.step import AXES
 from ...envs.platform.machines import Platform
+from ...envs.settings import from_dict, to_dict
 from ...envs.task.episode import platform_of
 from ...envs.task.kernels.observation import Layout, layout_of
 from ...envs.task.options import TaskOptions
 from . import names
-from .files import Record, contents_of, network_of, read, write
+from .files import Arrays, Contents, Record, arrays_below, contents_of, network_of, read, write
 from .names import SUFFIX, description_of
 from .network import Array, Network
 
@@ -32,34 +36,55 @@ DEFAULT: Final = "classical"
 """The washout where one is needed and none is named."""
 
 
-def base_parameters(
-    base: WashoutParameters | str | Path | None, task: TaskOptions
-) -> WashoutParameters | None:
-    """The washout that a task's action mode needs under the agent, or None.
+def base_of(base: Any, task: TaskOptions) -> Any:
+    """The base policy that a task's action mode needs under the agent, as an agent's file holds it.
 
     Args:
-        base: Its parameters, preset or YAML file; None for :data:`DEFAULT`.
+        base: Parameters of a washout or of predictive control, an :class:`Agent`, or the name or file of
+            either; None for ``task.action.base``, or :data:`DEFAULT`.
         task: The environment.
 
+    Returns:
+        Parameters, an agent, or None where the mode needs nothing.
+
     Raises:
-        UnknownNameError: no washout has this name.
-        ConfigurationError: a base is named, but the action mode has none.
+        UnknownNameError: no policy has this name.
+        ConfigurationError: a base is named, but the action mode has none; or no file could hold it.
     """
     mode = task.action.mode
     if mode not in ("residual", "gains"):
         if base is not None:
             raise ConfigurationError(f"base is of no use with task.action.mode {mode!r}; leave it out")
         return None
-    return base if isinstance(base, WashoutParameters) else load_washout(base or DEFAULT)
+    given = base or task.action.base or DEFAULT
+    if isinstance(given, str | Path):
+        policy: Any = make_policy(given, platform_of(task))
+        given = policy if policy.task is not None else policy.parameters
+    known = (MpcParameters, *(FAMILIES[family].parameters for family in FAMILIES))
+    if not isinstance(given, (Agent, *known)):
+        raise ConfigurationError(
+            f"base {base or task.action.base}: an agent's file cannot hold it; take a washout, predictive "
+            "control or an agent"
+        )
+    if mode == "gains" and not isinstance(given, WashoutParameters):
+        raise ConfigurationError("task.action.mode 'gains' needs the classical washout as its base")
+    return given
 
 
-def base_policy(base: WashoutParameters | str | Path | None, task: TaskOptions) -> Any:
-    """The policy of :func:`base_parameters`, as the environment takes it, or None."""
-    parameters = base_parameters(base, task)
-    if parameters is None:
+def base_policy(base: Any, task: TaskOptions) -> Any:
+    """The policy of :func:`base_of`, as the environment takes it, or None."""
+    held, platform = base_of(base, task), platform_of(task)
+    if held is None:
         return None
-    kind = ScheduledWashout if task.action.mode == "gains" else ClassicalWashout
-    return kind(parameters, platform_of(task).cab)
+    if isinstance(held, Agent):
+        return held.for_platform(platform)
+    if isinstance(held, MpcParameters):
+        from ...baselines.mpc import make_mpc
+
+        return make_mpc(platform, held)
+    if task.action.mode == "gains":
+        return ScheduledWashout(held, platform.cab)
+    return make_washout(held, platform.cab)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +96,8 @@ class Agent(TaskPolicy):
         task: The environment it was trained in.
         network: From the environment's observations to its actions.
         record: How it was made.
-        base: Washout under the action modes "residual" and "gains", as parameters, preset name or YAML file.
+        base: What acts under the agent in the action modes "residual" and "gains": parameters of a washout or
+            of predictive control, an agent, or the name or file of either.
 
     Raises:
         DataError: the network does not fit the task's observation or action.
@@ -82,17 +108,21 @@ class Agent(TaskPolicy):
     task: TaskOptions = field()
     network: Network = field()
     record: Record = field()
-    base: WashoutParameters | str | Path | None = None
+    base: Any = None
 
     def __post_init__(self) -> None:
         if not self.name:
             raise ConfigurationError("agent: name must not be empty")
-        if isinstance(self.base, str | Path):
-            object.__setattr__(self, "base", load_washout(self.base))
-        mode = self.task.action.mode
-        if (self.base is not None) != (mode in ("residual", "gains")):
-            need = "has no use for" if self.base is not None else "needs"
-            raise ConfigurationError(f"agent {self.name}: action.mode {mode!r} {need} a base, a washout")
+        mode, named = self.task.action.mode, self.base is not None or self.task.action.base is not None
+        if named != (mode in ("residual", "gains")):
+            need = "has no use for" if named else "needs"
+            raise ConfigurationError(f"agent {self.name}: action.mode {mode!r} {need} a base, a controller")
+        object.__setattr__(self, "base", base_of(self.base, self.task))
+        if self.network.bound != self.task.action.bound:
+            raise DataError(
+                f"agent {self.name}: its network's actions end at {self.network.bound:g}, its task's at "
+                f"{self.task.action.bound:g}"
+            )
         self._check_size("observation", self.network.size, self.layout.size)
         self._check_size("action", self.network.action_size, self.action_size)
 
@@ -106,7 +136,7 @@ class Agent(TaskPolicy):
     @property
     def action_size(self) -> int:
         """Entries of an action."""
-        return len(KNOBS) if self.task.action.mode == "gains" else len(AXES)
+        return len(KNOBS) if self.task.action.mode == "gains" else self.task.action.size
 
     @property
     def layout(self) -> Layout:
@@ -126,8 +156,8 @@ class Agent(TaskPolicy):
         )
 
     @cached_property
-    def base_policy(self) -> ClassicalWashout | None:
-        """The washout that the environment needs as ``base``, or None."""
+    def base_policy(self) -> Any:
+        """What the environment needs as ``base``, or None."""
         return None if self.base is None else base_policy(self.base, self.task)
 
     def predict(
@@ -137,7 +167,7 @@ class Agent(TaskPolicy):
         episode_start: NDArray[Any] | None = None,
         deterministic: bool = True,
     ) -> tuple[Array, Any]:
-        """Actions in [-1, 1], (n, k) or (k,), for observations (n, size) or (size,) of its environment.
+        """Actions within the bound, (n, k) or (k,), for observations (n, size) or (size,) of its environment.
 
         Raises:
             DataError: the observation has the wrong shape, or is not finite.
@@ -164,9 +194,12 @@ class Agent(TaskPolicy):
         """
         if Path(path).suffix != SUFFIX:
             raise ConfigurationError(f"{path}: an agent's file ends in {SUFFIX}")
-        base = self.base if isinstance(self.base, WashoutParameters) else None
-        contents = contents_of(self.name, self.task, self.network, self.record, base)
-        write(path, *contents)
+        arrays, contents = self._contents()
+        write(path, arrays, to_dict(contents))
+
+    def _contents(self) -> tuple[Arrays, Contents]:
+        base = self.base._contents() if isinstance(self.base, Agent) else self.base
+        return contents_of(self.name, self.task, self.network, self.record, base)
 
     @classmethod
     def load(cls, path: str | Path) -> Agent:
@@ -177,8 +210,14 @@ class Agent(TaskPolicy):
             ConfigurationError: its task is none that this version of the package knows.
         """
         tensors, values = read(path)
-        contents, network = network_of(tensors, values, str(path))
-        return cls(contents.name, contents.task, network, contents.record, contents.base)
+        return cls._of(tensors, from_dict(Contents, values, str(path)), str(path))
+
+    @classmethod
+    def _of(cls, tensors: Arrays, contents: Contents, source: str) -> Agent:
+        own, below = arrays_below(tensors)
+        network = network_of(own, contents, source)
+        base = contents.base if contents.agent is None else cls._of(below, contents.agent, source)
+        return cls(contents.name, contents.task, network, contents.record, base)
 
 
 def get_agent(name: str) -> Agent:

@@ -65,8 +65,8 @@ class Exported:
 def export_onnx(agent: Agent, path: str | Path) -> Exported:
     """Write an agent's network as ONNX, once it is known to compute the same.
 
-    Input ``observation`` (n, size) float32 as the environment gives it, output ``action`` (n, k) in
-    [-1, 1]. Rows, units, and what an action of 1 stands for are in the file's metadata.
+    Input ``observation`` (n, size) float32 as the environment gives it, output ``action`` (n, k) within
+    the bound. Rows, units, and what an action of 1 stands for are in the file's metadata.
 
     Raises:
         ExportError: a package is missing, or the exported network computes something else.
@@ -122,7 +122,8 @@ def metadata(agent: Agent) -> dict[str, str]:
     """What a user of the file has to know, as JSON where it is more than a word."""
     action = {
         "mode": agent.task.action.mode,
-        "range": [-1.0, 1.0],
+        "range": [-agent.task.action.bound, agent.task.action.bound],
+        "axes": list(agent.task.action.axes),
         "scale": action_scale(agent.platform, agent.task.action).tolist(),
         "scale_unit": "m/s^2 and rad/s^2, of an acceleration of 1 on each axis",
         "repeat": agent.task.action.repeat,

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from ...baselines.washout import WashoutParameters
+from ...baselines.mpc.parameters import MpcParameters
+from ...baselines.washout.families import AnyWashout, FamilyParameters
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.platform.machines import Platform
-from ...envs.settings import NonNegative, Positive, configuration, from_dict, to_dict
+from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.storage import write_bytes
 from ...envs.task.episode import platform_of
 from ...envs.task.options import TaskOptions
@@ -61,6 +62,8 @@ Arrays = dict[str, NDArray[Any]]
 
 _MEAN: Final = "observation.mean"
 _VARIANCE: Final = "observation.variance"
+_BASE: Final = "base."
+"""Before the names of arrays of the agent under an agent."""
 
 
 @configuration
@@ -77,7 +80,9 @@ class Contents:
         skip: Whether there is a skip connection to the output layer.
         clip: Of the normalized observation.
         layers: Of the network.
-        base: Washout under the agent.
+        base: Parameters of the washout or the predictive controller under the agent.
+        bound: Of its actions.
+        agent: The agent under the agent.
     """
 
     name: str
@@ -89,13 +94,20 @@ class Contents:
     skip: bool
     clip: Positive
     layers: int
-    base: WashoutParameters | None = None
+    base: MpcParameters | AnyWashout | None = None
+    bound: Positive = 1.0
+    agent: Contents | None = None
 
 
 def contents_of(
-    name: str, task: TaskOptions, network: Network, record: Record, base: WashoutParameters | None
-) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays by name, and plain values, of an agent."""
+    name: str,
+    task: TaskOptions,
+    network: Network,
+    record: Record,
+    base: MpcParameters | FamilyParameters | tuple[Arrays, Contents] | None,
+) -> tuple[Arrays, Contents]:
+    """Arrays by name, and contents, of an agent; ``base`` is a parameter set, or the same of an agent."""
+    below, inner = base if isinstance(base, tuple) else ({}, None)
     contents = Contents(
         name=name,
         task=task,
@@ -106,29 +118,30 @@ def contents_of(
         skip=network.skip,
         clip=network.clip,
         layers=len(network.weights),
-        base=base,
+        base=None if isinstance(base, tuple) else base,
+        bound=network.bound,
+        agent=inner,
     )
-    arrays: Arrays = {}
+    arrays: Arrays = {f"{_BASE}{key}": array for key, array in below.items()}
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[_weight(k)], arrays[_bias(k)] = weight, bias
     if network.mean is not None and network.variance is not None:
         arrays[_MEAN], arrays[_VARIANCE] = network.mean, network.variance
-    return arrays, to_dict(contents)
+    return arrays, contents
 
 
-def network_of(arrays: Mapping[str, NDArray[Any]], values: object, source: str) -> tuple[Contents, Network]:
-    """The contents and the network of a file.
+def network_of(arrays: Mapping[str, NDArray[Any]], contents: Contents, source: str) -> Network:
+    """The network of an agent.
 
     Args:
-        arrays: By name.
-        values: Plain values.
+        arrays: By name, those of the agent under it left out.
+        contents: Of its file.
         source: Of both, for messages.
 
     Raises:
         DataError: an array is missing, too many or of the wrong shape.
-        ConfigurationError: a value is unknown, missing or out of range, or the machine is another one now.
+        ConfigurationError: the machine is another one now.
     """
-    contents = from_dict(Contents, values, source)
     _check_platform(contents, source)
     layers = range(contents.layers)
     expected = {_weight(k) for k in layers} | {_bias(k) for k in layers}
@@ -136,7 +149,7 @@ def network_of(arrays: Mapping[str, NDArray[Any]], values: object, source: str) 
     if arrays.keys() - normalized != expected:
         wrong = ", ".join(sorted((arrays.keys() - normalized) ^ expected))
         raise DataError(f"{source}: arrays missing or unknown: {wrong}")
-    network = Network(
+    return Network(
         weights=tuple(arrays[_weight(k)] for k in layers),
         biases=tuple(arrays[_bias(k)] for k in layers),
         activation=contents.activation,
@@ -145,8 +158,15 @@ def network_of(arrays: Mapping[str, NDArray[Any]], values: object, source: str) 
         mean=arrays.get(_MEAN),
         variance=arrays.get(_VARIANCE),
         clip=contents.clip,
+        bound=contents.bound,
     )
-    return contents, network
+
+
+def arrays_below(arrays: Mapping[str, NDArray[Any]]) -> tuple[Arrays, Arrays]:
+    """The arrays of an agent, and those of the agent under it."""
+    own = {name: array for name, array in arrays.items() if not name.startswith(_BASE)}
+    below = {name[len(_BASE) :]: array for name, array in arrays.items() if name.startswith(_BASE)}
+    return own, below
 
 
 def _check_platform(contents: Contents, source: str) -> None:

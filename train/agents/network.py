@@ -62,21 +62,23 @@ ACTIVATIONS: Final[Mapping[str, ActivationFunctions]] = {
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Multilayer perceptron from observations to actions in [-1, 1].
+    """Multilayer perceptron from observations to actions within +-``bound``.
 
     The observation is normalized, (x - mean) / sqrt(variance + EPSILON), and clipped to +-``clip``. Hidden
-    layers with an activation follow, then a linear output layer. The output is squashed to [-1, 1].
+    layers with an activation follow, then a linear output layer. Its output is clipped to the bound, or goes
+    through bound tanh(.).
 
     Args:
         weights: (outputs, inputs) of each layer, float32.
         biases: (outputs,) of each layer, float32.
         activation: Of the hidden layers.
-        squash: "clip" or "tanh", applied to the output layer.
+        squash: "clip" or "tanh", of the output layer.
         skip: Skip connection: the output layer takes [last hidden layer, normalized observation] instead of
             the last hidden layer alone.
         mean: (size,) mean of the observation, float64; None leaves it as it is.
         variance: (size,) its variance; given with ``mean``.
         clip: Largest absolute value of a normalized observation.
+        bound: Largest absolute value of an action.
 
     Raises:
         DataError: a shape does not fit, a value is not finite, or a name is unknown.
@@ -90,6 +92,7 @@ class Network:
     mean: NDArray[np.float64] | None = None
     variance: NDArray[np.float64] | None = None
     clip: float = 10.0
+    bound: float = 1.0
 
     def __post_init__(self) -> None:
         _check_choice("activation", self.activation, get_args(Activation))
@@ -101,8 +104,9 @@ class Network:
         for name in ("mean", "variance"):
             if getattr(self, name) is not None:
                 self._take(name, _array(name, getattr(self, name), 1, np.float64))
-        if not (np.isfinite(self.clip) and self.clip > 0.0):
-            raise DataError(f"network: clip must be positive, found {self.clip}")
+        for name in ("clip", "bound"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise DataError(f"network: {name} must be positive, found {getattr(self, name)}")
         self._check_shapes()
 
     def _take(self, name: str, value: Any) -> None:
@@ -152,6 +156,10 @@ class Network:
         return high, (mean - high).astype(np.float32), (1.0 / np.sqrt(variance + EPSILON)).astype(np.float32)
 
     @cached_property
+    def _largest(self) -> Array:
+        return np.array(self.bound, dtype=np.float32)
+
+    @cached_property
     def _bounds(self) -> tuple[Array, Array]:
         return np.array(-self.clip, dtype=np.float32), np.array(self.clip, dtype=np.float32)
 
@@ -171,8 +179,11 @@ class Network:
         if self.skip and len(self.weights) > 1:
             hidden = np.concatenate([hidden, x], axis=-1)
         out = hidden.dot(self.weights[-1].T) + self.biases[-1]
-        squashed: Array = np.tanh(out) if self.squash == "tanh" else np.minimum(np.maximum(out, -_ONE), _ONE)
-        return squashed
+        largest = self._largest
+        if self.squash == "tanh":
+            squashed: Array = np.tanh(out) if self.bound == 1.0 else largest * np.tanh(out)
+            return squashed
+        return np.asarray(np.minimum(np.maximum(out, -largest), largest))
 
     def _normalized(self, x: Array) -> Array:
         if self.mean is None:

@@ -32,6 +32,8 @@ class Row:
         meaning: For people.
         bound: Greatest absolute value an environment's observation shows; what exceeds it is clipped.
         entries: Their number in words, where options decide it.
+        typical: Root mean square of each entry, or of all, in ``unit``: on random drives under the linear
+            washout, rounded (``python -m benchmarks.typical_rows``). None: as ``scale``.
     """
 
     name: str
@@ -41,28 +43,51 @@ class Row:
     meaning: str
     bound: float = 10.0
     entries: str = ""
+    typical: tuple[float, ...] | None = None
 
 
 ROWS: Final = (
-    Row("reference_force", 3, 10.0, "m/s^2", "car's specific force, gravity at rest taken off z"),
-    Row("reference_rate", 3, 1.0, "rad/s", "car's angular velocity"),
     Row(
-        "simulator_force", 3, 10.0, "m/s^2", "specific force at the cab's reference point, as reference_force"
+        "reference_force",
+        3,
+        10.0,
+        "m/s^2",
+        "car's specific force, gravity at rest taken off z",
+        typical=(1.5, 1.2, 0.3),
     ),
-    Row("simulator_rate", 3, 1.0, "rad/s", "angular velocity of the cab"),
-    Row("carriage", 2, 10.0, "m", "carriage x, y"),
-    Row("carriage_rate", 2, 5.0, "m/s", "their rates"),
-    Row("displacement", 3, 1.0, "m", "hexapod x, y, z from neutral"),
-    Row("velocity", 3, 1.0, "m/s", "their rates"),
-    Row("beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw"),
-    Row("beta_rate", 3, 1.0, "rad/s", "their rates"),
+    Row("reference_rate", 3, 1.0, "rad/s", "car's angular velocity", typical=(0.03, 0.02, 0.09)),
+    Row(
+        "simulator_force",
+        3,
+        10.0,
+        "m/s^2",
+        "specific force at the cab's reference point, as reference_force",
+        typical=(1.3, 1.1, 0.2),
+    ),
+    Row("simulator_rate", 3, 1.0, "rad/s", "angular velocity of the cab", typical=(0.05, 0.05, 0.09)),
+    Row("carriage", 2, 10.0, "m", "carriage x, y", typical=(5.0, 3.0)),
+    Row("carriage_rate", 2, 5.0, "m/s", "their rates", typical=(1.1, 0.8)),
+    Row("displacement", 3, 1.0, "m", "hexapod x, y, z from neutral", typical=(0.04, 0.03, 0.06)),
+    Row("velocity", 3, 1.0, "m/s", "their rates", typical=(0.03, 0.03, 0.02)),
+    Row("beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw", typical=(0.06, 0.1, 0.03)),
+    Row("beta_rate", 3, 1.0, "rad/s", "their rates", typical=(0.05, 0.05, 0.02)),
     Row("turntable", 2, 1.0, "1", "sine and cosine of the turntable's angle", 1.0),
-    Row("turntable_rate", 1, 1.0, "rad/s", "turntable rate"),
-    Row("legs", 6, 1.0, "1", "leg extensions over the limit they move towards", 1.0),
-    Row("leg_rates", 6, 1.0, "1", "leg speeds over their limit"),
-    Row("acceleration", 9, 10.0, "m/s^2, rad/s^2", "accelerations of the last step"),
+    Row("turntable_rate", 1, 1.0, "rad/s", "turntable rate", typical=(0.09,)),
+    Row("legs", 6, 1.0, "1", "leg extensions over the limit they move towards", 1.0, typical=(0.2,)),
+    Row("leg_rates", 6, 1.0, "1", "leg speeds over their limit", typical=(0.08,)),
+    Row(
+        "acceleration",
+        9,
+        10.0,
+        "m/s^2, rad/s^2",
+        "accelerations of the last step",
+        typical=(0.9, 0.9, 0.15, 0.15, 0.05, 0.3, 0.25, 0.03, 0.1),
+    ),
 )
 """The rows of an observation, in order."""
+
+TYPICAL: Final = {row.name: row.typical for row in ROWS}
+"""What the entries of each row usually are, in its SI unit."""
 
 OBSERVATION_SIZE: Final = sum(row.size for row in ROWS)
 """Entries of an observation."""

@@ -1,4 +1,4 @@
-"""Actions: numbers in [-1, 1] that become accelerations of the nine axes."""
+"""Actions: bounded numbers that become accelerations of the nine axes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...arrays import float_rows, real, vec2, vec3, vec9
+from ...arrays import float_rows, real, vec2, vec3, vec9, vec9i
 from ...platform.kernels.step import AXES, Motion
 from ...platform.kinematics import neutral_jacobian
 from ...platform.machines import Platform
@@ -28,7 +28,7 @@ ACCELERATION, JERK, VELOCITY, RESIDUAL, GAINS = (wp.constant(number) for number 
 
 @configuration
 class ActionOptions:
-    """What an action means; always a number in [-1, 1] for each entry.
+    """What an action means: a number within +-``bound`` for each entry, where 1 is the scale of an axis.
 
     Args:
         mode: "acceleration": of the nine axes. "jerk": their rate of change. "velocity": the speed to
@@ -38,8 +38,14 @@ class ActionOptions:
         largest: What that is a share of instead, m/s^2 and rad/s^2 in the order of ``AXES``: then an action
             asks for the same of every machine, which gives as much as it can.
         rise_time: Time in which full jerk takes an acceleration from zero to its largest value, s.
+        axes: Axes that an action has an entry for, by name; the others are the base policy's, or at rest.
+        bound: Largest absolute value of an entry. An algorithm that explores with a deviation of 1, as PPO
+            does by default, needs a scale that is gentle and a bound of several times that.
+        base: Policy that acts under the agent in the modes "residual" and "gains", by name or file, unless it
+            is given to the environment.
         frozen: Axes that do not move, by name.
         repeat: Time steps for which an action is held; rewards are averaged over them.
+        ramp: Whether an action is reached linearly over that time, not at once: no jumps in force.
         frame: Axes of carriage, displacement and tilt: "machine", or "cab": turned with the cab's heading.
     """
 
@@ -47,12 +53,23 @@ class ActionOptions:
     authority: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     largest: Annotated[tuple[Positive, ...], Field(min_length=9, max_length=9)] | None = None
     rise_time: Positive = 0.2
+    axes: Annotated[tuple[str, ...], Field(min_length=1)] = AXES
+    bound: Positive = 1.0
+    base: str | None = None
     frozen: tuple[str, ...] = ()
     repeat: Annotated[int, Field(ge=1)] = 1
+    ramp: bool = False
     frame: Frame = "machine"
 
     def __post_init__(self) -> None:
-        check_names("axis", self.frozen, AXES)
+        check_names("axis", (*self.frozen, *self.axes), AXES)
+        if len(set(self.axes)) < len(self.axes):
+            raise ValueError(f"axes must differ, found {', '.join(self.axes)}")
+
+    @property
+    def size(self) -> int:
+        """Entries of an action, but in the mode "gains"."""
+        return len(self.axes)
 
 
 def acceleration_scale(platform: Platform) -> Floats:
@@ -102,6 +119,9 @@ class ActionScale:
     mode: int
     axes: wp.array(dtype=AxisScale)  # on each machine
     free: vec9  # 0 for a frozen axis, else 1
+    entry: vec9i  # of an action for each axis, -1 where it has none
+    bound: wp.float32  # of an entry
+    ramp: int  # whether an action is reached linearly
     cab_frame: int  # whether an action is turned with the cab's heading
 
 
@@ -116,6 +136,8 @@ def action_scales(platforms: Sequence[Platform], options: ActionOptions, device:
         axes.append(one)
     scale: Any = ActionScale()
     scale.mode, scale.cab_frame = MODES[options.mode], int(options.frame == "cab")
+    scale.bound, scale.ramp = options.bound, int(options.ramp)
+    scale.entry = vec9i(*(options.axes.index(axis) if axis in options.axes else -1 for axis in AXES))
     scale.free = vec9(*(float(axis not in options.frozen) for axis in AXES))
     scale.axes = wp.array(axes, dtype=AxisScale, device=device)
     return scale
@@ -205,26 +227,46 @@ def requested(mode: int, scale: AxisScale, axis: int, u: real, before: real, rat
 
 
 @wp.func
-def take_action(action: float_rows, now: float_rows, before: float_rows, i: int) -> int:
+def take_action(action: float_rows, now: float_rows, before: float_rows, bound: wp.float32, i: int) -> int:
     """Keep the clipped action and the one before; returns how many entries were clipped."""
     clipped = int(0)
     for k in range(action.shape[1]):
         u = action[i, k]
-        if wp.abs(u) > wp.float32(1.0):
+        if wp.abs(u) > bound:
             clipped = clipped + 1
         before[i, k] = now[i, k]
-        now[i, k] = wp.clamp(u, wp.float32(-1.0), wp.float32(1.0))
+        now[i, k] = wp.clamp(u, -bound, bound)
     return clipped
 
 
 @wp.func
+def entry(scale: ActionScale, axis: int, now: float_rows, before: float_rows, i: int, share: real) -> real:
+    """The entry of an action for an axis when ``share`` of its time has passed; 0 where it has none."""
+    k = scale.entry[axis]
+    if k < 0:
+        return real(0.0)
+    u = real(now[i, k])
+    if scale.ramp != 0:
+        return real(before[i, k]) + (u - real(before[i, k])) * share
+    return u
+
+
+@wp.func
 def own_accelerations(
-    scale: ActionScale, which: int, m: Motion, now: float_rows, i: int, before: vec9, dt: real
+    scale: ActionScale,
+    which: int,
+    m: Motion,
+    now: float_rows,
+    before: float_rows,
+    i: int,
+    share: real,
+    last: vec9,
+    dt: real,
 ) -> vec9:
     """The accelerations an action itself asks for in a time step, in its frame.
 
-    ``which`` is the number of the machine, ``m`` are its set-points, ``before`` are those of
-    the step before.
+    ``which`` is the number of the machine, ``m`` are its set-points, ``share`` is that of the action's time
+    at the end of the step, ``last`` are the accelerations of the step before.
     """
     if scale.mode == GAINS:
         return vec9()
@@ -232,17 +274,11 @@ def own_accelerations(
     if scale.cab_frame != 0:
         rates = to_cab(m, rates)
     axes = scale.axes[which]
-    return vec9(
-        requested(scale.mode, axes, 0, real(now[i, 0]), before[0], rates[0], dt),
-        requested(scale.mode, axes, 1, real(now[i, 1]), before[1], rates[1], dt),
-        requested(scale.mode, axes, 2, real(now[i, 2]), before[2], rates[2], dt),
-        requested(scale.mode, axes, 3, real(now[i, 3]), before[3], rates[3], dt),
-        requested(scale.mode, axes, 4, real(now[i, 4]), before[4], rates[4], dt),
-        requested(scale.mode, axes, 5, real(now[i, 5]), before[5], rates[5], dt),
-        requested(scale.mode, axes, 6, real(now[i, 6]), before[6], rates[6], dt),
-        requested(scale.mode, axes, 7, real(now[i, 7]), before[7], rates[7], dt),
-        requested(scale.mode, axes, 8, real(now[i, 8]), before[8], rates[8], dt),
-    )
+    own = vec9()
+    for axis in range(9):
+        u = entry(scale, axis, now, before, i, share)
+        own[axis] = requested(scale.mode, axes, axis, u, last[axis], rates[axis], dt)
+    return own
 
 
 @wp.func

@@ -1,4 +1,4 @@
-"""The kernels of a batch: play a time step, look (observe), and forget the actions of an ended episode.
+"""The kernels of a batch: play a time step, look (observe), ask a base policy, forget an ended episode.
 
 action -> accelerations -> **motion base, cues, perception** -> reward -> observation
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from ...arrays import bool_array, float_array, float_rows, int_array, real, real_rows, vec9
+from ...arrays import bool_array, float_rows, int_array, pair_array, real, real_rows, vec9
 from ...perception.kernels import Vestibular
 from ...platform.kernels.step import Machine, SetPoint
 from ...simulator.kernels.observation import write_observation
@@ -31,7 +31,7 @@ class Rules:
     action: ActionScale
     reward: Reward
     view: View
-    share: real  # of a time step in an action
+    repeat: int  # time steps in an action
     dt: real  # time step, s
 
 
@@ -62,28 +62,37 @@ class Arrays:
     core: real_rows
     fixed: real_rows  # the fixed rows in the observation's frame
     memory: float_rows  # low-passed cues of every sample of every drive
-    bounds: float_array  # of an observation's entries
+    bounds: pair_array  # of an observation's entries, and their factors
     observation: float_rows
 
 
 @wp.func
-def commanded(rules: Rules, a: Arrays, which: int, s: State, i: int, first: int) -> vec9:
-    """Accelerations of a time step, the first of an action or a later one."""
-    c = a.command[i]
-    if first != 0:
-        c.clipped = take_action(a.action, a.now, a.before, i)
-    c.own = own_accelerations(rules.action, which, s.setpoint, a.now, i, c.own, rules.dt)
-    c.commanded = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
-    a.command[i] = c
-    return wp.cw_mul(c.commanded, a.episode[i].actuator_gain)
+def share_of(rules: Rules, step: int) -> real:
+    """Share of an action's time that has passed after time step number ``step``."""
+    return real(step + 1) / real(rules.repeat)
 
 
 @wp.func
-def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> int:
+def commanded(rules: Rules, a: Arrays, which: int, s: State, i: int, step: int) -> vec9:
+    """Accelerations of time step number ``step`` of an action."""
+    c = a.command[i]
+    if step == 0:
+        c.clipped = take_action(a.action, a.now, a.before, rules.action.bound, i)
+    share = share_of(rules, step)
+    c.own = own_accelerations(
+        rules.action, which, s.setpoint, a.now, a.before, i, share, c.own, rules.dt
+    )  # fmt: skip
+    c.commanded = applied_accelerations(rules.action, s.setpoint, c.own, a.base[i])
+    a.command[i] = c
+    return c.commanded
+
+
+@wp.func
+def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, step: int) -> int:
     """Terms, reward and ends after a time step; terms are means over the time steps of an action."""
-    terms = state_terms(rules.reward.scale, m, s, rules.share)
+    terms = state_terms(rules.reward.scale, m, s, real(1.0) / real(rules.repeat))
     ended = bool(False)
-    if first != 0:
+    if step == 0:
         terms = terms + action_terms(a.now, a.before, i)
     else:
         terms = terms + a.terms[i]
@@ -93,7 +102,7 @@ def judge(rules: Rules, a: Arrays, m: Machine, s: State, i: int, first: int) -> 
         terms = terms + ends
         ended = wp.max(ends) > real(0.0)
     a.terms[i] = terms
-    a.reward[i] = -wp.dot(rules.reward.weights, terms)
+    a.reward[i] = wp.max(-wp.dot(rules.reward.weights, terms) / a.episode[i].cost_scale, -rules.reward.floor)
     a.terminated[i] = ended
     a.truncated[i] = s.sample >= a.episode[i].last
     return 0
@@ -125,24 +134,24 @@ def play(
     drives: Drives,
     machine_of: int_array,
     drive_of: int_array,
-    first: int,
+    step: int,
     parts: int,
     state: wp.array(dtype=State),
     delay: wp.array2d(dtype=SetPoint),
     state_out: wp.array(dtype=State),
     delay_out: wp.array2d(dtype=SetPoint),
 ) -> None:
-    """One time step: ``first`` says whether an action begins, ``parts`` what of the observation is made."""
+    """Time step number ``step`` of an action; ``parts`` says what of the observation is made."""
     i = wp.tid()
     which = machine_of[i]
     m = machines[which]
     s = state[i]
-    acceleration = commanded(rules, a, which, s, i, first)
+    acceleration = wp.cw_mul(commanded(rules, a, which, s, i, step), a.episode[i].actuator_gain)
     after = next_state(m, vestibular[0], drives, drive_of[i], delay, i, s, acceleration, rules.dt)
     if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
-    judge(rules, a, m, after, i, first)
+    judge(rules, a, m, after, i, step)
     look_at(rules, a, drives, drive_of[i], which, m, after, i, parts)
 
 
@@ -170,6 +179,17 @@ def look(
 
 
 @wp.kernel(enable_backward=False, module="unique")
+def ask(
+    rules: Rules, a: Arrays, machine_of: int_array, only_begins: int, state: wp.array(dtype=State)
+) -> None:
+    """The accelerations that actions command now, without a time step: those of a base policy."""
+    i = wp.tid()
+    if only_begins != 0 and not a.begins[i]:
+        return
+    commanded(rules, a, machine_of[i], state[i], i, 0)
+
+
+@wp.kernel(enable_backward=False, module="unique")
 def forget(a: Arrays) -> None:
     """Clear actions and commands where an episode begins."""
     i = wp.tid()
@@ -190,7 +210,7 @@ def play_with_adjoint(
     drives: Drives,
     machine_of: int_array,
     drive_of: int_array,
-    first: int,
+    step: int,
     now: float_rows,
     before: float_rows,
     own: wp.array(dtype=vec9),
@@ -202,12 +222,16 @@ def play_with_adjoint(
     terms: wp.array(dtype=vec_terms),
     cost: wp.array(dtype=real),
 ) -> None:
-    """One time step; adds its terms, and minus its reward to the cost. ``now`` lies within [-1, 1]."""
+    """Time step number ``step`` of an action; adds its terms, and minus its reward to the cost.
+
+    ``now`` lies within the bound.
+    """
     i = wp.tid()
     which = machine_of[i]
     m = machines[which]
     s = state[i]
-    own_now = own_accelerations(rules.action, which, s.setpoint, now, i, own[i], rules.dt)
+    share = share_of(rules, step)
+    own_now = own_accelerations(rules.action, which, s.setpoint, now, before, i, share, own[i], rules.dt)
     own_out[i] = own_now
     applied = applied_accelerations(rules.action, s.setpoint, own_now, vec9())
     commanded = wp.cw_mul(applied, episodes[i].actuator_gain)
@@ -215,11 +239,11 @@ def play_with_adjoint(
     if m.has_dynamics != 0:
         shift_delay(delay, delay_out, i, after.setpoint)
     state_out[i] = after
-    found = state_terms(rules.reward.scale, m, after, rules.share)
+    found = state_terms(rules.reward.scale, m, after, real(1.0) / real(rules.repeat))
     wp.atomic_add(terms, i, found)
-    if first != 0:
+    if step == 0:
         found = found + action_terms(now, before, i)
-    wp.atomic_add(cost, i, wp.dot(rules.reward.weights, found))
+    wp.atomic_add(cost, i, wp.dot(rules.reward.weights, found) / episodes[i].cost_scale)
 
 
 @wp.kernel(enable_backward=True, module="unique")
@@ -231,7 +255,7 @@ def look_with_adjoint(
     machine_of: int_array,
     drive_of: int_array,
     memory: float_rows,
-    bounds: float_array,
+    bounds: pair_array,
     now: float_rows,
     own: wp.array(dtype=vec9),
     state: wp.array(dtype=State),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.signal import lfilter
 
-from ...arrays import float_array, float_rows, real, real_rows, vec2, vec3, vec9
+from ...arrays import float_rows, pair_array, real, real_rows, vec2, vec3, vec9
 from ...cues import GRAVITY, CueTrace
 from ...platform.kernels.step import Machine, Motion
 from ...platform.kinematics import axis_reach
@@ -29,6 +29,7 @@ from ...simulator.kernels.observation import (
     FIRST,
     ROWS,
     SCALES,
+    TYPICAL,
     Row,
     share_of_limit,
     slices_of,
@@ -39,6 +40,7 @@ from .action import Frame, Mode, acceleration_scale, heading, motion_in_cab, to_
 
 Floats = NDArray[np.float64]
 SimulatorCueSource = Literal["machine", "model"]
+Scaling = Literal["physical", "typical"]
 
 
 @configuration
@@ -61,6 +63,8 @@ class ObservationOptions:
         simulator_cue: Source of the rows of simulator cues. "machine": true motion, by its sensors. "model":
             those of the set-points, which a controller works out by itself. A policy that sees the second
             has no loop through the actuators, so their lag and dead time cannot make it swing.
+        scaling: "physical": entries in the scale of their row. "typical": over what they usually are, so that
+            all have a deviation of about 1, as neural networks need; fixed numbers, no running statistics.
     """
 
     preview: Annotated[int, Field(ge=0)] = 0
@@ -72,6 +76,7 @@ class ObservationOptions:
     frame: Frame = "machine"
     machine: bool = False
     simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
+    scaling: Scaling = "physical"
 
 
 @dataclass(frozen=True)
@@ -120,11 +125,28 @@ MACHINE: Final = (
 )
 """Rows of ``machine`` that do not change; 0 for what the machine does not have. See :func:`abilities`."""
 
+_TYPICAL_CUE: Final = (0.15, 0.12, 0.03, 0.03, 0.02, 0.09)
+"""Of `reference_force`, in its scale, and `reference_rate`."""
+
 ADDED: Final = (
     *_added(
         lambda seen, mode, action: 1,
-        Row("force_error", 3, 10.0, "m/s^2", "car's specific force minus the cab's"),
-        Row("rate_error", 3, 1.0, "rad/s", "car's angular velocity minus the cab's"),
+        Row(
+            "force_error",
+            3,
+            10.0,
+            "m/s^2",
+            "car's specific force minus the cab's",
+            typical=(0.75, 0.65, 0.35),
+        ),
+        Row(
+            "rate_error",
+            3,
+            1.0,
+            "rad/s",
+            "car's angular velocity minus the cab's",
+            typical=(0.05, 0.05, 0.02),
+        ),
     ),
     *_added(
         lambda seen, mode, action: action,
@@ -134,7 +156,14 @@ ADDED: Final = (
     ),
     *_added(
         lambda seen, mode, action: mode == "jerk",
-        Row("command", 9, 10.0, "m/s^2, rad/s^2", '`action.mode` "jerk": accelerations last asked for'),
+        Row(
+            "command",
+            9,
+            10.0,
+            "m/s^2, rad/s^2",
+            '`action.mode` "jerk": accelerations last asked for',
+            typical=TYPICAL["acceleration"],
+        ),
     ),
     *_added(
         lambda seen, mode, action: mode == "residual",
@@ -144,6 +173,7 @@ ADDED: Final = (
             10.0,
             "m/s^2, rad/s^2",
             '`action.mode` "residual": accelerations the base policy asks for now',
+            typical=TYPICAL["acceleration"],
         ),
     ),
     *_added(
@@ -156,6 +186,7 @@ ADDED: Final = (
             "`observation.preview`: car's cues ahead, nearest first, as `reference_force` and "
             "`reference_rate`; the last cue after the end",
             entries="6 each",
+            typical=_TYPICAL_CUE,
         ),
     ),
     *_added(
@@ -168,6 +199,7 @@ ADDED: Final = (
             "`observation.memory`: car's cues through 1/(Ts + 1), for each time constant T, in the order of "
             "`preview`",
             entries="6 each",
+            typical=_TYPICAL_CUE,
         ),
     ),
     *_added(
@@ -178,23 +210,50 @@ ADDED: Final = (
             10.0,
             "m/s^2",
             "`observation.perceived`: specific force perceived in the car",
+            typical=TYPICAL["reference_force"],
         ),
-        Row("perceived_reference_rate", 3, 1.0, "rad/s", "angular velocity perceived in the car"),
-        Row("perceived_simulator_force", 3, 10.0, "m/s^2", "specific force perceived in the cab"),
-        Row("perceived_simulator_rate", 3, 1.0, "rad/s", "angular velocity perceived in the cab"),
+        Row(
+            "perceived_reference_rate",
+            3,
+            1.0,
+            "rad/s",
+            "angular velocity perceived in the car",
+            typical=TYPICAL["reference_rate"],
+        ),
+        Row(
+            "perceived_simulator_force",
+            3,
+            10.0,
+            "m/s^2",
+            "specific force perceived in the cab",
+            typical=TYPICAL["simulator_force"],
+        ),
+        Row(
+            "perceived_simulator_rate",
+            3,
+            1.0,
+            "rad/s",
+            "angular velocity perceived in the cab",
+            typical=TYPICAL["simulator_rate"],
+        ),
     ),
     *_added(
         lambda seen, mode, action: seen.true_motion,
         Row(
-            "true_carriage", 2, 10.0, "m", "`observation.true_motion`: carriage x, y after lag and dead time"
+            "true_carriage",
+            2,
+            10.0,
+            "m",
+            "`observation.true_motion`: carriage x, y after lag and dead time",
+            typical=TYPICAL["carriage"],
         ),
-        Row("true_carriage_rate", 2, 5.0, "m/s", "their rates"),
-        Row("true_displacement", 3, 1.0, "m", "hexapod x, y, z"),
-        Row("true_velocity", 3, 1.0, "m/s", "their rates"),
-        Row("true_beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw"),
-        Row("true_beta_rate", 3, 1.0, "rad/s", "their rates"),
+        Row("true_carriage_rate", 2, 5.0, "m/s", "their rates", typical=TYPICAL["carriage_rate"]),
+        Row("true_displacement", 3, 1.0, "m", "hexapod x, y, z", typical=TYPICAL["displacement"]),
+        Row("true_velocity", 3, 1.0, "m/s", "their rates", typical=TYPICAL["velocity"]),
+        Row("true_beta", 3, 1.0, "rad", "hexapod roll, pitch, yaw", typical=TYPICAL["beta"]),
+        Row("true_beta_rate", 3, 1.0, "rad/s", "their rates", typical=TYPICAL["beta_rate"]),
         Row("true_turntable", 2, 1.0, "1", "sine and cosine of the turntable's angle", 1.0),
-        Row("true_turntable_rate", 1, 1.0, "rad/s", "turntable rate"),
+        Row("true_turntable_rate", 1, 1.0, "rad/s", "turntable rate", typical=TYPICAL["turntable_rate"]),
     ),
     *_added(
         lambda seen, mode, action: seen.machine,
@@ -215,10 +274,12 @@ class Layout:
     Args:
         rows: Of one frame, in order.
         stack: Frames, the newest first.
+        scaling: Of the entries.
     """
 
     rows: tuple[Row, ...]
     stack: int
+    scaling: Scaling = "physical"
 
     @cached_property
     def frame(self) -> int:
@@ -241,6 +302,17 @@ class Layout:
         frame = np.repeat([row.bound for row in self.rows], [row.size for row in self.rows])
         return np.tile(frame, self.stack).astype(np.float32)
 
+    @cached_property
+    def gains(self) -> NDArray[np.float32]:
+        """(size,) factor from the physical scale of each entry to the one it is shown in."""
+        gains = np.ones(self.frame)
+        if self.scaling == "typical":
+            rows = [(row, row.typical or (row.scale,)) for row in self.rows]
+            gains = np.concatenate(
+                [row.scale / np.tile(typical, row.size // len(typical)) for row, typical in rows]
+            )
+        return np.tile(gains, self.stack).astype(np.float32)
+
     def first(self, name: str) -> int:
         """Where a row begins, or -1 if it is not there."""
         return self.slices[name].start if name in self.slices else -1
@@ -253,7 +325,7 @@ def layout_of(options: ObservationOptions, mode: Mode, action_size: int) -> Layo
         times = int(added.times(options, mode, action_size))
         if times:
             rows.append(replace(added.row, size=times * added.row.size))
-    return Layout(tuple(rows), options.stack)
+    return Layout(tuple(rows), options.stack, options.scaling)
 
 
 SIMULATOR_FORCE, SIMULATOR_RATE = wp.constant(FIRST["simulator_force"]), wp.constant(FIRST["simulator_rate"])
@@ -262,12 +334,12 @@ REFERENCE_FORCE, REFERENCE_RATE = wp.constant(FIRST["reference_force"]), wp.cons
 
 def observation_table() -> str:
     """Every row an observation can have, as a table in Markdown."""
-    lines = ["| Row | Entries | Unit | Scale | Bound | Meaning |", "|---|---|---|---|---|---|"]
+    lines = ["| Row | Entries | Unit | Scale | Typical | Bound | Meaning |", "|---|---|---|---|---|---|---|"]
     for row in (*ROWS, *(added.row for added in ADDED)):
         entries = row.entries or str(row.size)
-        lines.append(
-            f"| `{row.name}` | {entries} | {row.unit} | {row.scale:g} | {row.bound:g} | {row.meaning} |"
-        )
+        typical = ", ".join(f"{value:g}" for value in row.typical or (row.scale,))
+        cells = [f"`{row.name}`", entries, row.unit, f"{row.scale:g}", typical, f"{row.bound:g}", row.meaning]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -348,6 +420,7 @@ class Episode:
     force_gain: real  # of the cab's accelerometers
     rate_gain: real  # of its gyroscopes
     actuator_gain: vec9
+    cost_scale: real  # rewards are divided by
 
 
 Firsts: Any = wp.struct(
@@ -388,16 +461,17 @@ def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[fl
 
 
 @wp.func
-def put_entry(out: float_rows, i: int, k: int, value: real, bounds: float_array) -> int:
-    """Write an entry, clipped to its bound."""
+def put_entry(out: float_rows, i: int, k: int, value: real, bounds: pair_array) -> int:
+    """Write an entry, times its factor, clipped to its bound."""
     # Once only: an entry that is written twice would count twice in the adjoint.
-    out[i, k] = wp.clamp(wp.float32(value), -bounds[k], bounds[k])
+    pair = bounds[k]
+    out[i, k] = wp.clamp(wp.float32(value) * pair[1], -pair[0], pair[0])
     return 0
 
 
 @wp.func
 def put_vector(
-    out: float_rows, i: int, first: int, value: Any, size: int, scale: real, bounds: float_array
+    out: float_rows, i: int, first: int, value: Any, size: int, scale: real, bounds: pair_array
 ) -> int:
     """Write the ``size`` entries of a row that begins at ``first``."""
     for k in range(size):
@@ -413,7 +487,7 @@ def lifted(force: vec3) -> vec3:
 
 @wp.func
 def put_measured(
-    v: View, e: Episode, sample: int, fixed: real_rows, bounds: float_array, out: float_rows, i: int
+    v: View, e: Episode, sample: int, fixed: real_rows, bounds: pair_array, out: float_rows, i: int
 ) -> int:
     """Write the simulator's rows, the cab's cues with the errors of its sensors, and the cues' errors."""
     # A generator of its own for each sample: an observation does not depend on how often it is made.
@@ -451,7 +525,7 @@ def put_measured(
 
 @wp.func
 def put_preview(
-    v: View, drives: Drives, drive: int, sample: int, bounds: float_array, out: float_rows, i: int
+    v: View, drives: Drives, drive: int, sample: int, bounds: pair_array, out: float_rows, i: int
 ) -> int:
     """Write the car's cues ahead, the last one of the drive after its end."""
     first = drives.first[drive]
@@ -465,7 +539,7 @@ def put_preview(
 
 
 @wp.func
-def put_perceived(f: Firsts, s: State, bounds: float_array, out: float_rows, i: int) -> int:
+def put_perceived(f: Firsts, s: State, bounds: pair_array, out: float_rows, i: int) -> int:
     """Write the perceived cues."""
     car = s.perceived_reference
     cab = s.perceived_simulator
@@ -481,7 +555,7 @@ def put_perceived(f: Firsts, s: State, bounds: float_array, out: float_rows, i: 
 
 
 @wp.func
-def put_true_motion(f: Firsts, m: Motion, bounds: float_array, out: float_rows, i: int) -> int:
+def put_true_motion(f: Firsts, m: Motion, bounds: pair_array, out: float_rows, i: int) -> int:
     """Write the true motion."""
     turntable = vec2(wp.sin(m.position[8]), wp.cos(m.position[8]))
     put_vector(out, i, f.true_carriage, m.position, 2, wp.static(UNIT["true_carriage"]), bounds)
@@ -497,7 +571,7 @@ def put_true_motion(f: Firsts, m: Motion, bounds: float_array, out: float_rows, 
 
 @wp.func
 def put_machine(
-    v: View, which: int, m: Machine, setpoint: Motion, bounds: float_array, out: float_rows, i: int
+    v: View, which: int, m: Machine, setpoint: Motion, bounds: pair_array, out: float_rows, i: int
 ) -> int:
     """Write what the machine can do, constants of the batch, and the shares of travel it uses."""
     for k in range(v.abilities.shape[1]):
@@ -579,7 +653,7 @@ def write_frame(
     command: vec9,
     base: vec9,
     memory: float_rows,
-    bounds: float_array,
+    bounds: pair_array,
     out: float_rows,
     i: int,
 ) -> int:

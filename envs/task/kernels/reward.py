@@ -231,6 +231,13 @@ class RewardOptions:
         stroke_margin: Share of the travel that costs nothing.
         stroke_braking: Travel counts where an actuator would come to a stop with this share of its
             acceleration, so that what lies beyond a short horizon costs now; None: where it is.
+        standstill: Rewards are divided by 1 + this share of J of standing still on the drive, so that each
+            drive counts by how well it can be done, and not by how fierce it is; 0: they are not divided.
+        against_base: Whether the reward of the base policy alone, on a second machine in the same drive, is
+            taken off: 0 for an agent that does nothing, above for one that is better. The drive's own ups
+            and downs, which no action changes, are gone then; it takes twice the simulation.
+        floor: Rewards are at least minus this, so that a rare collapse does not outweigh all else; None: no
+            floor.
     """
 
     weights: RewardWeights = RewardWeights()
@@ -240,6 +247,9 @@ class RewardOptions:
     tilt_rate: Positive = math.radians(3.0)
     stroke_margin: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.8
     stroke_braking: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    standstill: NonNegative = 0.0
+    against_base: bool = False
+    floor: Positive | None = None
 
 
 @wp.struct
@@ -248,6 +258,7 @@ class Reward:
 
     weights: vec_terms
     scale: RewardScale
+    floor: real  # rewards are at least minus this
     terminate: int  # whether failure ends an episode
 
 
@@ -263,6 +274,7 @@ def reward_of(options: RewardOptions, terminate: bool) -> Any:
     reward: Any = Reward()
     reward.weights = vec_terms(*(getattr(options.weights, name) for name in TERMS))
     reward.scale, reward.terminate = scale, int(terminate)
+    reward.floor = math.inf if options.floor is None else options.floor
     return reward
 
 

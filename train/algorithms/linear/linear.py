@@ -39,7 +39,7 @@ from ....envs.task.kernels.observation import Layout
 from ....envs.task.options import PositiveCount
 from ...agents import Network
 from ...config import TrainingConfig
-from ...networks import TORCH_ACTIVATIONS, Actor, start_linear
+from ...networks import TORCH_ACTIVATIONS, Actor, as_shown, start_linear
 from ...registry import Boundary, Learner, State, restoring
 from ...training import check_episodes
 
@@ -299,7 +299,7 @@ class LinearLearner(Learner):
         return values
 
     def _gains(self, point: Floats) -> NDArray[np.float32]:
-        return gains(washout_at(point), self.batch.layout, self.batch.usual_scale).astype(np.float32)
+        return as_shown(gains(washout_at(point), self.batch.layout, self.batch.usual_scale), self.batch)
 
     @property
     def washout(self) -> LinearWashout:

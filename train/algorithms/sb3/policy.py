@@ -88,6 +88,7 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         mean=mean,
         variance=variance,
         clip=clip,
+        bound=float(model.action_space.high.flat[0]),
     )
 
 

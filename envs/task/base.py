@@ -1,0 +1,236 @@
+"""Base policies: the controller that acts under the agent in the action modes "residual" and "gains".
+
+- :class:`Base`: none, for the other modes.
+- :class:`RowsBase`: a washout, predictive control or one's own. It sees the simulator's rows, and answers
+  with accelerations.
+- :class:`TaskBase`: an agent, such as a linear washout. It sees its own environment's observation, and
+  answers with actions.
+- :class:`Schedule`: a washout whose gains the agent chooses.
+
+A whole batch acts at once, in every time step, or as often as an agent's own environment does.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cues import CueTrace
+from ..errors import ConfigurationError
+from ..platform.machines import Platform
+from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
+from .arrays import FRAME, BatchArrays, Launches, rules_of
+from .kernels.observation import layout_of, low_passed
+from .options import TaskOptions
+
+Array = NDArray[Any]
+Mask = NDArray[np.bool_]
+
+_MAKER: Final = "motion_cueing.train.agents", "make_policy"
+"""Module and function that make a policy of a name or file; this room knows no policies itself."""
+
+
+def base_of(policy: Any, options: TaskOptions, platform: Platform) -> Any:
+    """The base policy of a task: ``policy`` itself, or what it or ``action.base`` names; None for none.
+
+    Raises:
+        UnknownNameError: no policy has this name.
+        ConfigurationError: the action mode has no base policy, or its policy must know the drive.
+    """
+    mode = options.action.mode
+    if mode not in ("residual", "gains"):
+        if policy is not None:
+            raise ConfigurationError(f"base= is of no use with action.mode {mode!r}; leave it out")
+        return None
+    given = options.action.base if policy is None else policy
+    if given is None:
+        method = "predict" if mode == "residual" else "schedule"
+        raise ConfigurationError(
+            f"action.mode {mode!r} needs base=, a policy with {method}(...), or action.base"
+        )
+    if isinstance(given, str | Path):
+        module, function = _MAKER
+        given = getattr(import_module(module), function)(given, platform)
+    if mode == "residual" and getattr(given, "needs_drive", False):
+        raise ConfigurationError(
+            f"base {given.name}: it must know the drive before it begins, which no environment tells it; "
+            "take one that does not, such as 'classical' or 'mpc'"
+        )
+    return given
+
+
+class Base:
+    """No base policy.
+
+    Attributes:
+        policy: The policy, or None.
+        every: Time steps from one action of the policy to the next; 0 for never.
+        before: Whether it acts before each time step, with the agent's action, instead of after it.
+    """
+
+    policy: Any = None
+    every: int = 0
+    before: bool = False
+
+    def begin(self, mask: Mask) -> None:
+        """Episodes begin in the masked environments."""
+
+    def act(
+        self, observation: Array, out: Array, gains: Array | None = None, mask: Mask | None = None
+    ) -> None:
+        """Write what the policy does into ``out`` (n, 9), accelerations in m/s^2 and rad/s^2.
+
+        Args:
+            observation: (n, OBSERVATION_SIZE) the simulator's rows.
+            out: Where to.
+            gains: (n, k) of a schedule.
+            mask: (n,) the environments it acts in, the others stay as they are; default: all.
+        """
+
+    def snapshot(self) -> Snapshot:
+        """The memory, for :meth:`restore`."""
+        return {}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot."""
+
+
+class RowsBase(Base):
+    """A policy that sees the simulator's rows.
+
+    Its state is None, an array with a row, or a list with an item for each environment.
+
+    Raises:
+        ConfigurationError: the policy has no ``predict``, or has another time step than the machine.
+    """
+
+    every = 1
+
+    def __init__(self, policy: Any, n: int) -> None:
+        method = "schedule" if self.before else "predict"
+        if not hasattr(policy, method):
+            name = type(policy).__name__
+            raise ConfigurationError(f"base={name}: it has no method {method}, which the action mode needs")
+        self.policy = policy
+        self._begins = np.ones(n, dtype=bool)
+        self._state: Any = None
+
+    def begin(self, mask: Mask) -> None:
+        """Episodes begin in the masked environments."""
+        self._begins |= mask
+
+    def _answer(self, observation: Array, gains: Array | None, begins: Mask) -> tuple[Any, Any]:
+        answer: tuple[Any, Any] = self.policy.predict(observation, self._state, begins, deterministic=True)
+        return answer
+
+    def act(
+        self, observation: Array, out: Array, gains: Array | None = None, mask: Mask | None = None
+    ) -> None:
+        """Write what the policy does; see :class:`Base`."""
+        action, state = self._answer(observation, gains, self._begins.copy())
+        action = np.reshape(action, out.shape)
+        if mask is None or self._state is None or state is None:
+            out[...], self._state = action, state
+            self._begins[...] = False
+            return
+        out[mask] = action[mask]
+        self._state = copy.copy(self._state)
+        for i in np.flatnonzero(mask).tolist():
+            self._state[i] = state[i]
+        self._begins &= ~mask
+
+    def snapshot(self) -> Snapshot:
+        """The memory, for :meth:`restore`."""
+        state = {} if self._state is None else {"base_state": copy.deepcopy(self._state)}
+        return {"base_begins": self._begins.copy(), **state}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot."""
+        self._begins[...] = snapshot["base_begins"]
+        self._state = copy.deepcopy(snapshot.get("base_state"))
+
+
+class Schedule(RowsBase):
+    """A policy with ``gain_names`` and ``schedule(observation, gains, state, episode_start)``."""
+
+    before = True
+
+    def _answer(self, observation: Array, gains: Array | None, begins: Mask) -> tuple[Any, Any]:
+        answer: tuple[Any, Any] = self.policy.schedule(observation, gains, self._state, begins)
+        return answer
+
+
+class TaskBase(Base):
+    """An agent, with the observations and actions of its own environment on the machines of the batch.
+
+    Args:
+        policy: The agent: ``task`` and ``predict``.
+        options: The task of the batch.
+        simulator: Of the batch.
+        drives: Of the batch, at the machine's time step.
+        shared: Arrays of the batch; the noise of its episodes is that of the agent's sensors, too.
+
+    Raises:
+        ConfigurationError: the agent has a base policy itself, or acts at another rate than it can here.
+    """
+
+    def __init__(
+        self,
+        policy: Any,
+        options: TaskOptions,
+        simulator: Simulator,
+        drives: Sequence[CueTrace],
+        shared: BatchArrays,
+    ) -> None:
+        task, repeat = policy.task, policy.task.action.repeat
+        if task.action.mode in ("residual", "gains"):
+            raise ConfigurationError(
+                f"base {policy.name}: it has a base itself; give an agent whose action.mode is 'acceleration'"
+            )
+        if options.action.repeat % repeat:
+            raise ConfigurationError(
+                f"base {policy.name}: it acts every {repeat} time steps, of which action.repeat "
+                f"{options.action.repeat} is no multiple"
+            )
+        self.policy, self.every = policy, repeat
+        layout = layout_of(task.observation, task.action.mode, task.action.size)
+        memory = low_passed(drives, task.observation.memory, TIME_STEP)
+        self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, simulator.device)
+        self.arrays.episode, self.arrays.begins = shared.episode, shared.begins
+        rules = rules_of(task, layout, simulator.platforms, TIME_STEP, simulator.device)
+        self._launches = Launches(simulator, self.arrays, rules)
+        self._everywhere = np.ones(simulator.n, dtype=bool)
+        self._state: Any = None
+
+    def begin(self, mask: Mask) -> None:
+        """Forget the last action where episodes begin."""
+        self._launches.forget()
+
+    def act(
+        self, observation: Array, out: Array, gains: Array | None = None, mask: Mask | None = None
+    ) -> None:
+        """Write what the agent does; see :class:`Base`."""
+        arrays = self.arrays
+        self._launches.look(mask is not None, FRAME)
+        action, _ = self.policy.predict(arrays.observation.pull(), None, None, deterministic=True)
+        arrays.action.view[...] = action
+        arrays.action.push()
+        self._launches.ask(mask is not None)
+        where = self._everywhere if mask is None else mask
+        out[where] = arrays.command.pull()["commanded"][where]
+
+    def snapshot(self) -> Snapshot:
+        """The memory, for :meth:`restore`."""
+        return {f"base.{name}": bytes_of(mirror.array) for name, mirror in self.arrays.changing()}
+
+    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a snapshot."""
+        for name, mirror in self.arrays.changing():
+            put_bytes(mirror.array, f"base.{name}", snapshot)
+            mirror.pull()
