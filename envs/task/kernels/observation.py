@@ -267,6 +267,10 @@ UNIT: Final = {row.name: real(row.scale) for row in (*ROWS, *(added.row for adde
 """Scale of each row, for kernels."""
 
 
+_LARGEST_TYPICAL: Final = 10.0
+"""Greatest absolute value of an entry over what it usually is."""
+
+
 @dataclass(frozen=True)
 class Layout:
     """Where everything lies in an observation.
@@ -298,7 +302,9 @@ class Layout:
 
     @cached_property
     def bounds(self) -> NDArray[np.float32]:
-        """(size,) greatest absolute value of each entry."""
+        """(size,) greatest absolute value of each entry, as it is shown."""
+        if self.scaling == "typical":
+            return np.full(self.size, _LARGEST_TYPICAL, dtype=np.float32)
         frame = np.repeat([row.bound for row in self.rows], [row.size for row in self.rows])
         return np.tile(frame, self.stack).astype(np.float32)
 
