@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from ..arrays import Mirror, real, vec9
+from ..launch import Launch
 from ..platform.machines import Platform
 from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.simulator import Simulator
@@ -87,7 +88,7 @@ class Launches:
     def __init__(self, simulator: Simulator, arrays: BatchArrays, rules: Any) -> None:
         self._simulator = simulator
         self._common = [rules, arrays.for_kernels()]
-        self._recorded: dict[tuple[Any, ...], Any] = {}
+        self._recorded: dict[tuple[Any, ...], Launch] = {}
 
     def play(self, step: int, parts: int) -> None:
         """Time step number ``step`` of an action, and ``parts`` of the observations."""
@@ -129,4 +130,4 @@ class Launches:
 
     def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> None:
         n, device = self._simulator.n, self._simulator.device
-        self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)
+        self._recorded[key] = Launch(kernel, n, arguments, device=device)
