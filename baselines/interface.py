@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..envs.arrays import Mirror, real
 from ..envs.cues import CueTrace
 from ..envs.errors import ConfigurationError
+from ..envs.launch import Launch
 from ..envs.perception.models import VestibularModel, get_vestibular_model
 from ..envs.platform.machines import Platform
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE, SLICES, observe_forward
@@ -56,13 +57,12 @@ class Observer:
         self._out = wp.zeros((simulator.n, OBSERVATION_SIZE), dtype=real, device=simulator.device)
         # A recorded launch for each of the two copies of the state, which hold in turn.
         self._launches = [
-            wp.launch(
+            Launch(
                 observe_forward,
                 simulator.n,
                 inputs=[simulator.machines, simulator.machine_of, state],
                 outputs=[self._out],
                 device=simulator.device,
-                record_cmd=True,
             )
             for state, _ in simulator.copies
         ]

@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from ...envs.arrays import real, vec9
+from ...envs.launch import Launch
 from ...envs.platform.machines import Cab, Platform
 from ...envs.settings import read_yaml
 from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
@@ -49,13 +50,12 @@ class _Buffers:
         self.memory = wp.zeros(n, dtype=kernels.memory, device="cpu")
         self.after = wp.zeros(n, dtype=kernels.memory, device="cpu")
         self.action = wp.zeros(n, dtype=vec9, device="cpu")
-        self.launch = wp.launch(
+        self.launch = Launch(
             kernels.predict,
             n,
             inputs=[parameters, parameters_of, self.observation, self.begins, self.memory, real(dt)],
             outputs=[self.after, self.action],
             device="cpu",
-            record_cmd=True,
         )
         self.views = {name: getattr(self, name).numpy() for name in ("observation", "begins", "memory")}
         self.results = self.after.numpy(), self.action.numpy()

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import FLOAT, Mirror, find_device, real, vec3, vec9
 from ..cues import CueTrace
 from ..errors import ActionError, ConfigurationError, DataError
+from ..launch import Launch
 from ..perception.kernels import Vestibular, vestibular_parameters
 from ..perception.models import VestibularModel, get_vestibular_model
 from ..platform.kernels.step import ACTUATORS, Machine, SetPoint
@@ -127,20 +128,31 @@ class Simulator:
         self._delays = [wp.zeros((n, depth), dtype=SetPoint, device=device) for _ in range(2)]
         self.action_array = wp.zeros(n, dtype=vec9, device=device)
         self._now = 0
-        self._steps: list[Any] = []
+        self._steps: list[Launch] = []
+        self._resets: list[Launch] = []
         on_host = device.is_cpu
         self._views = [state.numpy() for state in self._states] if on_host else None
         self._action_view = self.action_array.numpy() if on_host else None
 
-    def _record(self, begin: int) -> Any:
+    def _record(self, begin: int) -> Launch:
         """A recorded launch from copy ``begin`` of the state to the other."""
-        return wp.launch(
+        return Launch(
             step_forward,
             self.n,
             inputs=[*self.constants, self._states[begin], self._delays[begin], self.action_array],
             outputs=[self._states[1 - begin], self._delays[1 - begin]],
             device=self.device,
-            record_cmd=True,
+        )
+
+    def _record_reset(self, which: int) -> Launch:
+        """A recorded launch that puts copy ``which`` of the state at rest."""
+        placing = [self._placing[name].array for name in ("sample", "start", "mask")]
+        return Launch(
+            reset_forward,
+            self.n,
+            inputs=[*self.constants[:-1], *placing],
+            outputs=[self._states[which], self._delays[which]],
+            device=self.device,
         )
 
     @property
@@ -234,16 +246,9 @@ class Simulator:
             mirror.push()
         self.drive_of = self._placing["drive_of"].view
         self.platform_of = self._placing["machine_of"].view
-        wp.launch(
-            reset_forward,
-            self.n,
-            inputs=[
-                *self.constants[:-1],
-                *(self._placing[name].array for name in ("sample", "start", "mask")),
-            ],
-            outputs=[self._states[self._now], self._delays[self._now]],
-            device=self.device,
-        )
+        if not self._resets:
+            self._resets = [self._record_reset(0), self._record_reset(1)]
+        self._resets[self._now].launch()
 
     def _check_start(self, poses: NDArray[np.float64], chosen: NDArray[np.bool_]) -> None:
         limits = self.machines.numpy()

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from ..arrays import Mirror, real, vec9
+from ..launch import Launch
 from ..platform.machines import Platform
 from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.simulator import Simulator
@@ -87,46 +88,52 @@ class Launches:
     def __init__(self, simulator: Simulator, arrays: BatchArrays, rules: Any) -> None:
         self._simulator = simulator
         self._common = [rules, arrays.for_kernels()]
-        self._recorded: dict[tuple[Any, ...], Any] = {}
+        self._recorded: dict[tuple[Any, ...], Launch] = {}
 
     def play(self, step: int, parts: int) -> None:
         """Time step number ``step`` of an action, and ``parts`` of the observations."""
         simulator = self._simulator
         key = ("play", step, parts, simulator.current)
-        if key not in self._recorded:
+        launch = self._recorded.get(key)
+        if launch is None:
             begin, end = simulator.copies[simulator.current], simulator.copies[1 - simulator.current]
             *constants, _ = simulator.constants
-            self._record(key, play, [*self._common, *constants, step, parts, *begin, *end])
-        self._recorded[key].launch()
+            launch = self._record(key, play, [*self._common, *constants, step, parts, *begin, *end])
+        launch.launch()
         simulator.swap()
 
     def look(self, only_begins: bool, parts: int) -> None:
         """``parts`` of the observations, outside of a step."""
         simulator = self._simulator
         key = ("look", only_begins, parts, simulator.current)
-        if key not in self._recorded:
+        launch = self._recorded.get(key)
+        if launch is None:
             machines, _, drives, machine_of, drive_of, _ = simulator.constants
             state, _ = simulator.copies[simulator.current]
             arrays = [machines, drives, machine_of, drive_of]
-            self._record(key, look, [*self._common, *arrays, int(only_begins), parts, state])
-        self._recorded[key].launch()
+            launch = self._record(key, look, [*self._common, *arrays, int(only_begins), parts, state])
+        launch.launch()
 
     def ask(self, only_begins: bool) -> None:
         """The accelerations of a base policy's actions, without a time step."""
         simulator = self._simulator
         key = ("ask", only_begins, simulator.current)
-        if key not in self._recorded:
+        launch = self._recorded.get(key)
+        if launch is None:
             _, _, _, machine_of, _, _ = simulator.constants
             state, _ = simulator.copies[simulator.current]
-            self._record(key, ask, [*self._common, machine_of, int(only_begins), state])
-        self._recorded[key].launch()
+            launch = self._record(key, ask, [*self._common, machine_of, int(only_begins), state])
+        launch.launch()
 
     def forget(self) -> None:
         """Forget the actions where episodes begin."""
-        if ("forget",) not in self._recorded:
-            self._record(("forget",), forget, [self._common[1]])
-        self._recorded[("forget",)].launch()
+        key = ("forget",)
+        launch = self._recorded.get(key)
+        if launch is None:
+            launch = self._record(key, forget, [self._common[1]])
+        launch.launch()
 
-    def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> None:
+    def _record(self, key: tuple[Any, ...], kernel: Any, arguments: list[Any]) -> Launch:
         n, device = self._simulator.n, self._simulator.device
-        self._recorded[key] = wp.launch(kernel, n, inputs=arguments, device=device, record_cmd=True)
+        launch = self._recorded[key] = Launch(kernel, n, arguments, device=device)
+        return launch

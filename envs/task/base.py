@@ -205,8 +205,7 @@ class TaskBase(Base):
         self.arrays.episode, self.arrays.begins = shared.episode, shared.begins
         rules = rules_of(task, layout, simulator.platforms, TIME_STEP, simulator.device)
         self._launches = Launches(simulator, self.arrays, rules)
-        self._everywhere = np.ones(simulator.n, dtype=bool)
-        self._state: Any = None
+        self._commanded = self.arrays.command.view["commanded"]
 
     def begin(self, mask: Mask) -> None:
         """Forget the last action where episodes begin."""
@@ -222,8 +221,8 @@ class TaskBase(Base):
         arrays.action.view[...] = action
         arrays.action.push()
         self._launches.ask(mask is not None)
-        where = self._everywhere if mask is None else mask
-        out[where] = arrays.command.pull()["commanded"][where]
+        arrays.command.pull()
+        np.copyto(out, self._commanded, where=True if mask is None else mask[:, None])
 
     def snapshot(self) -> Snapshot:
         """The memory, for :meth:`restore`."""

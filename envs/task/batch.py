@@ -82,6 +82,7 @@ class Batch:
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
         memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
+        self._clipped: NDArray[np.int32] = self.arrays.command.view["clipped"]
         self.base = self._base(policy)
         platforms = self.simulator.platforms
         self.scales = np.array([action_scale(one, options.action) for one in platforms])
@@ -272,7 +273,8 @@ class Batch:
     @property
     def clipped(self) -> NDArray[np.int32]:
         """(n,) entries of the last action beyond its bound."""
-        return np.asarray(self.arrays.command.pull()["clipped"])
+        self.arrays.command.pull()
+        return self._clipped
 
     def write(self, action: ArrayLike) -> None:
         """Put actions (n, action_size) into ``arrays.action``.
@@ -280,13 +282,13 @@ class Batch:
         Raises:
             ActionError: a wrong shape, or a value that is not finite; nothing has moved then.
         """
-        values = np.asarray(action, dtype=np.float32)
-        if values.shape != self.arrays.action.view.shape:
-            raise ActionError(f"action has shape {values.shape}, expected {self.arrays.action.view.shape}")
+        values, taken = np.asarray(action, dtype=np.float32), self.arrays.action
+        if values.shape != taken.view.shape:
+            raise ActionError(f"action has shape {values.shape}, expected {taken.view.shape}")
         if not np.isfinite(values).all():
             raise ActionError(f"action is not finite: {values[~np.isfinite(values)][:3]} among its entries")
-        self.arrays.action.view[...] = values
-        self.arrays.action.push()
+        taken.view[...] = values
+        taken.push()
 
     def drive_indices(self, names: str | int | Sequence[str | int]) -> NDArray[np.int32]:
         """Indices into :attr:`drives`, of drives by index or name.

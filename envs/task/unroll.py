@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import real, vec9
 from ..errors import ConfigurationError
+from ..launch import Launch
 from ..platform.kernels.step import SetPoint
 from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.kernels.step import State
@@ -77,7 +78,7 @@ class TaskUnroll:
         self._terms = wp.zeros(n, dtype=vec_terms, device=device)
         self._all = [*self._states, *self._delays, *self._own, *self._taken, *self._fixed, *self._seen]
 
-    def _record(self, adjoint: bool) -> tuple[list[Any], list[list[Any]]]:
+    def _record(self, adjoint: bool) -> tuple[list[Launch], list[list[Launch]]]:
         """The launches of all observations, and of the time steps of all actions."""
         looks = [
             self._launch(look_with_adjoint, self._look_arguments(k), adjoint) for k in range(self.actions + 1)
@@ -91,16 +92,14 @@ class TaskUnroll:
         ]
         return looks, plays
 
-    def _launch(self, kernel: Any, arguments: list[Any], adjoint: bool) -> Any:
-        adjoints = {"adj_inputs": [_adjoint(a) for a in arguments], "adj_outputs": []} if adjoint else {}
-        return wp.launch(
+    def _launch(self, kernel: Any, arguments: list[Any], adjoint: bool) -> Launch:
+        return Launch(
             kernel,
             self.batch.n,
-            inputs=arguments,
+            arguments,
             device=self.batch.simulator.device,
             adjoint=adjoint,
-            record_cmd=True,
-            **adjoints,
+            adj_inputs=[_adjoint(a) for a in arguments] if adjoint else [],
         )
 
     def _look_arguments(self, k: int) -> list[Any]:
