@@ -44,13 +44,17 @@ class DrivingSimulatorVecEnv(VecEnv):
         drives: Cue traces to drive instead of those of ``task.episode``.
         base: The base policy of the action modes "residual" and "gains", by name or file too; default:
             ``action.base``.
+        group: Consecutive environments that share a seed, and so all that is drawn: drive, start, machine.
+            Only their actions differ; see :class:`~.algorithms.sb3.groups.GroupRolloutBuffer`.
+        stagger: Whether the first episodes end one after another, not all at once.
         device: "cpu" or a CUDA device of Warp.
         render_mode: "rgb_array", "human" (a window that shows the first environment), or None.
         render_size: Width and height of a frame, pixels; default: 960 x 540, of a window 1280 x 720.
         **fields: Fields of ``TaskOptions`` to replace, as dataclasses or dictionaries.
 
     Raises:
-        ConfigurationError: an option is unknown, of the wrong type or out of range.
+        ConfigurationError: an option is unknown, of the wrong type or out of range, or ``num_envs`` is no
+            multiple of ``group``.
     """
 
     def __init__(
@@ -60,12 +64,17 @@ class DrivingSimulatorVecEnv(VecEnv):
         *,
         drives: Sequence[CueTrace] | None = None,
         base: Any = None,
+        group: int = 1,
+        stagger: bool = False,
         device: str = "cpu",
         render_mode: str | None = None,
         render_size: tuple[int, int] | None = None,
         **fields: Any,
     ) -> None:
+        if group < 1 or num_envs % group:
+            raise ConfigurationError(f"num_envs {num_envs} must be a multiple of group {group}")
         self.task = task_options(task, fields)
+        self.group, self._stagger = group, stagger
         self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
         self._pictures = pictures_of(self.batch, render_mode, render_size)
         self.render_mode = render_mode
@@ -94,9 +103,21 @@ class DrivingSimulatorVecEnv(VecEnv):
         if given and len(given) < self.num_envs:
             raise ConfigurationError("option drive must be given for every environment or for none")
         self._begin(everywhere, self.batch.drive_indices(given) if given else None)
+        if self._stagger:
+            self._shorten()
         self._reset_seeds()
         self._reset_options()
         return self.batch.arrays.observation.pull().copy()
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seeds for the next reset: ``seed``, ``seed + 1``... for the groups; default: at random.
+
+        Returns:
+            (num_envs) seeds.
+        """
+        super().seed(seed)
+        self._seeds = [self._seeds[i // self.group] for i in range(self.num_envs)]
+        return self._seeds
 
     def _begin(self, mask: NDArray[np.bool_], drive: NDArray[np.int32] | None = None) -> None:
         self.batch.begin(mask, drive)
@@ -104,6 +125,16 @@ class DrivingSimulatorVecEnv(VecEnv):
         if self._pictures is not None:
             self._pictures.begin(mask)
         self._returns[mask], self._sums[mask], self._steps[mask] = 0.0, 0.0, 0
+
+    def _shorten(self) -> None:
+        """Let the episodes that have just begun end one after another, group by group."""
+        batch, repeat = self.batch, self.task.action.repeat
+        groups = self.num_envs // self.group
+        share = np.repeat((1.0 + np.arange(groups)) / groups, self.group)
+        first, episode = batch.simulator.state["sample"], batch.arrays.episode
+        actions = np.ceil(share * (episode.view["last"] - first) / repeat).astype(np.int64)
+        episode.view["last"] = np.minimum(first + np.maximum(actions, 1) * repeat, episode.view["last"])
+        episode.push()
 
     def step_async(self, actions: ArrayLike) -> None:
         """Take actions (n, k), which :meth:`step_wait` plays.
