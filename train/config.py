@@ -6,13 +6,20 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, JsonValue
+from pydantic import BeforeValidator, Field, JsonValue
 
 from ..baselines.washout.families import AnyWashout, load_parameters
 from ..envs.errors import ConfigurationError
 from ..envs.maneuvers import drive_seeds
 from ..envs.settings import Positive, configuration, from_dict, merge, read_yaml
-from ..envs.task.options import Count, EpisodeOptions, PositiveCount, RandomizationOptions, TaskOptions
+from ..envs.task.options import (
+    Count,
+    EpisodeOptions,
+    PositiveCount,
+    RandomizationOptions,
+    TaskOptions,
+    task_of,
+)
 from .registry import algorithm_names, preset_of
 
 Measure = Literal["cue_error", "perceived_error", "reward"]
@@ -130,7 +137,8 @@ class TrainingConfig:
 
     Args:
         algo: The algorithm, by name.
-        task: The environment. ``task.episode.drives`` stays empty: only random drives are trained on.
+        task: The environment: a task's name or file, or its fields, with the task they change as ``preset``.
+            ``task.episode.drives`` stays empty: only random drives are trained on.
         base: What acts under the agent, where ``task.action.mode`` needs that: parameters of a washout, or
             the name or file of a washout, predictive control or an agent; default: ``task.action.base``,
             or "classical".
@@ -138,6 +146,8 @@ class TrainingConfig:
         hyperparameters: Arguments of the algorithm.
         normalize: Running normalization.
         n_envs: Environments stepped together.
+        group: Environments in the same drive, whose rewards are relative to each other's; for algorithms of
+            Stable-Baselines3, see :class:`~.vec_env.DrivingSimulatorVecEnv`.
         steps: Actions in all, over all environments.
         seed: Of everything that is drawn.
         validation: How the agent is judged meanwhile.
@@ -150,12 +160,13 @@ class TrainingConfig:
     """
 
     algo: str
-    task: TaskOptions = TaskOptions()
+    task: Annotated[TaskOptions, BeforeValidator(task_of)] = TaskOptions()
     base: AnyWashout | str | None = None
     initial: str | None = None
     hyperparameters: dict[str, JsonValue] = field(default_factory=dict)
     normalize: NormalizeOptions = NormalizeOptions()
     n_envs: PositiveCount = 64
+    group: PositiveCount = 1
     steps: PositiveCount = 1_000_000
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     validation: ValidationOptions = ValidationOptions()
@@ -168,6 +179,8 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         episode = self.task.episode
+        if self.n_envs % self.group:
+            raise ValueError(f"n_envs {self.n_envs} must be a multiple of group {self.group}")
         if self.algo not in algorithm_names():
             raise ValueError(f"algo must be one of {', '.join(algorithm_names())}, found {self.algo!r}")
         if episode.drives:

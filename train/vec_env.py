@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,9 @@ class DrivingSimulatorVecEnv(VecEnv):
         base: The base policy of the action modes "residual" and "gains", by name or file too; default:
             ``action.base``.
         group: Consecutive environments that share a seed, and so all that is drawn: drive, start, machine.
-            Only their actions differ; see :class:`~.algorithms.sb3.groups.GroupRolloutBuffer`.
+            Their returns differ by their actions alone. The reward of each is then relative to the mean of
+            the others (``reward.against_base`` is off), as in GRPO: most of a reward is the road's, and that
+            is gone. ``episode`` in ``infos`` has the return before that.
         stagger: Whether the first episodes end one after another, not all at once.
         device: "cpu" or a CUDA device of Warp.
         render_mode: "rgb_array", "human" (a window that shows the first environment), or None.
@@ -74,6 +77,8 @@ class DrivingSimulatorVecEnv(VecEnv):
         if group < 1 or num_envs % group:
             raise ConfigurationError(f"num_envs {num_envs} must be a multiple of group {group}")
         self.task = task_options(task, fields)
+        if group > 1:
+            self.task = replace(self.task, reward=replace(self.task.reward, against_base=False))
         self.group, self._stagger = group, stagger
         self.batch = Batch(num_envs, self.task, drives=drives, base=base, device=device)
         self._pictures = pictures_of(self.batch, render_mode, render_size)
@@ -161,7 +166,15 @@ class DrivingSimulatorVecEnv(VecEnv):
             for i in np.flatnonzero(ended).tolist():
                 infos[i] = self._final_info(i, bool(truncated[i] and not terminated[i]))
             self._begin(ended)
-        return arrays.observation.pull().copy(), reward, ended, infos
+        return arrays.observation.pull().copy(), self._relative(reward), ended, infos
+
+    def _relative(self, reward: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Rewards (n,) less the mean of the others in the group."""
+        if self.group == 1:
+            return reward
+        grouped = reward.reshape(-1, self.group)
+        own = grouped - grouped.mean(axis=1, keepdims=True)
+        return (own * (self.group / (self.group - 1.0))).reshape(-1).astype(np.float32)
 
     def _final_info(self, i: int, truncated: bool) -> dict[str, Any]:
         elapsed = round(time.perf_counter() - self._began, 6)

@@ -158,11 +158,8 @@ def load_task(task: TaskOptions | str | Path | None = None, **fields: Any) -> Ta
         DataError: the file cannot be read or is not YAML.
         ConfigurationError: no task has this name, a field is unknown, of the wrong type or out of range.
     """
-    if task is None or isinstance(task, TaskOptions):
-        start, source = task or TaskOptions(), "environment options"
-    else:
-        source = str(task)
-        start = _from_values(_values_of(task), source)
+    source = "environment options" if task is None or isinstance(task, TaskOptions) else str(task)
+    start = TaskOptions() if task is None else task_of(task, source)
     if not fields:
         return start
     return from_dict(TaskOptions, merged_task(start, fields), source)
@@ -186,8 +183,12 @@ def _values_of(task: str | Path) -> object:
     return read_yaml(_PRESETS / f"{task}.yaml")
 
 
-def _from_values(values: object, source: str) -> TaskOptions:
-    """A task of the values in a file, which may name the one they change."""
+def task_of(values: object, source: str = "task") -> TaskOptions:
+    """A task, from itself, its name or file, or plain values; these may name a ``preset`` they change."""
+    if isinstance(values, TaskOptions):
+        return values
+    if isinstance(values, str | Path):
+        values = _values_of(values)
     if isinstance(values, Mapping) and "preset" in values:
         rest = {name: value for name, value in values.items() if name != "preset"}
         return load_task(str(values["preset"]), **rest)

@@ -111,3 +111,46 @@ def test_an_agent_learns_on_it_and_is_evaluated():
         mean, _ = evaluate_policy(agent, envs, n_eval_episodes=2)
     assert np.isfinite(mean)
     envs.close()
+
+
+def test_a_group_shares_what_is_drawn_and_rewards_are_relative_to_the_others():
+    episode = {"library": 6, "drive_duration": 3.0, "duration": 1.0}
+    single = [DrivingSimulator("cueing", episode=episode, reward={"against_base": False}) for _ in range(6)]
+    envs = DrivingSimulatorVecEnv(6, "cueing", episode=episode, group=3)
+    envs.seed(11)
+    first = envs.reset()
+    alone = np.array([one.reset(seed=11 + i // 3)[0] for i, one in enumerate(single)])
+    # The base policy's network adds up in another order in a batch.
+    assert np.allclose(first, alone, rtol=0.0, atol=1e-5)
+    assert np.array_equal(first[0], first[2])
+    assert not np.array_equal(first[0], first[3])
+    rng, returns = np.random.default_rng(0), np.zeros(6)
+    for _ in range(12):
+        action = rng.uniform(-1.0, 1.0, (6, 4)).astype(np.float32)
+        reward = envs.step(action)[1]
+        own = np.array([one.step(one_action)[1] for one, one_action in zip(single, action, strict=True)])
+        for i in range(6):
+            others = [k for k in range(6) if k // 3 == i // 3 and k != i]
+            assert reward[i] == pytest.approx(own[i] - own[others].mean(), rel=1e-3, abs=1e-4)
+        returns += own
+    done, action = np.zeros(6, dtype=bool), np.zeros((6, 4), dtype=np.float32)
+    while not done.any():
+        reward, done, infos = envs.step(action)[1:]
+        returns += [one.step(one_action)[1] for one, one_action in zip(single, action, strict=True)]
+    # The group begins and ends together, and its returns are those of the environments themselves.
+    assert done.all()
+    assert [info["episode"]["r"] for info in infos] == pytest.approx(returns.tolist(), rel=1e-3)
+    with pytest.raises(ConfigurationError, match="num_envs 6 must be a multiple of group 4"):
+        DrivingSimulatorVecEnv(6, "cueing", group=4)
+
+
+def test_staggered_first_episodes_end_one_after_another_and_the_next_are_whole():
+    episode = {"library": 2, "drive_duration": 3.0, "duration": 1.2}
+    envs = DrivingSimulatorVecEnv(6, "cueing", episode=episode, group=2, stagger=True)
+    envs.reset()
+    ends = []
+    for k in range(1, 46):
+        for i in np.flatnonzero(envs.step(np.zeros((6, 4), dtype=np.float32))[2]):
+            ends.append((k, int(i)))
+    # 120 time steps are 15 actions of 8: first a third, two thirds and all of them.
+    assert ends == sorted((k, i) for i in range(6) for k in range(5 * (1 + i // 2), 46, 15) if k <= 45)

@@ -178,7 +178,14 @@ class SB3Learner(Learner):
         # Checked before the drives are made, which takes seconds.
         arguments(algorithm, config.hyperparameters, 1)
         base = base_policy(config.base, config.task)
-        self.simulators = DrivingSimulatorVecEnv(config.n_envs, config.task, base=base, device=config.device)
+        self.simulators = DrivingSimulatorVecEnv(
+            config.n_envs,
+            config.task,
+            base=base,
+            group=config.group,
+            stagger=config.group > 1,
+            device=config.device,
+        )
         self.normalize = _normalized(self.simulators, config)
         env: VecEnv = self.normalize or self.simulators
         (size,) = self.simulators.action_space.shape or (0,)
