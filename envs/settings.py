@@ -84,6 +84,8 @@ def from_dict(cls: type[T], values: object, source: str = "configuration") -> T:
         ConfigurationError: naming ``source``, each wrong field and, for an unknown one, the nearest known.
     """
     if not isinstance(values, dict):
+        if isinstance(values, cls):
+            return values
         raise ConfigurationError(
             f"{source}: expected fields of {cls.__name__}, found {type(values).__name__}"
         )

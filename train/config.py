@@ -18,7 +18,7 @@ from ..envs.task.options import (
     PositiveCount,
     RandomizationOptions,
     TaskOptions,
-    task_of,
+    task_values,
 )
 from .registry import algorithm_names, preset_of
 
@@ -160,7 +160,7 @@ class TrainingConfig:
     """
 
     algo: str
-    task: Annotated[TaskOptions, BeforeValidator(task_of)] = TaskOptions()
+    task: Annotated[TaskOptions, BeforeValidator(task_values)] = TaskOptions()
     base: AnyWashout | str | None = None
     initial: str | None = None
     hyperparameters: dict[str, JsonValue] = field(default_factory=dict)

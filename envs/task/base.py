@@ -50,19 +50,34 @@ def base_of(policy: Any, options: TaskOptions, platform: Platform) -> Any:
         return None
     given = options.action.base if policy is None else policy
     if given is None:
-        method = "predict" if mode == "residual" else "schedule"
         raise ConfigurationError(
-            f"action.mode {mode!r} needs base=, a policy with {method}(...), or action.base"
+            f"action.mode {mode!r} needs base=, a policy, its name or its file; or the name as action.base"
         )
-    if isinstance(given, str | Path):
-        module, function = _MAKER
-        given = getattr(import_module(module), function)(given, platform)
-    if mode == "residual" and getattr(given, "needs_drive", False):
+    module, function = _MAKER
+    make = getattr(import_module(module), function)
+    # What is given as an object may be meant for another machine.
+    given = make(given, platform, force=not isinstance(given, str | Path))
+    if given.needs_drive:
         raise ConfigurationError(
             f"base {given.name}: it must know the drive before it begins, which no environment tells it; "
             "take one that does not, such as 'classical' or 'mpc'"
         )
     return given
+
+
+def gains_of(policy: Any) -> int:
+    """How many gains the base policy of the mode "gains" has.
+
+    Raises:
+        ConfigurationError: it has none.
+    """
+    try:
+        return len(policy.gain_names)
+    except AttributeError:
+        raise ConfigurationError(
+            f"base {policy.name}: action.mode 'gains' needs a policy with gain_names and schedule(...), "
+            "such as ScheduledWashout"
+        ) from None
 
 
 class Base:
@@ -105,18 +120,11 @@ class RowsBase(Base):
     """A policy that sees the simulator's rows.
 
     Its state is None, an array with a row, or a list with an item for each environment.
-
-    Raises:
-        ConfigurationError: the policy has no ``predict``, or has another time step than the machine.
     """
 
     every = 1
 
     def __init__(self, policy: Any, n: int) -> None:
-        method = "schedule" if self.before else "predict"
-        if not hasattr(policy, method):
-            name = type(policy).__name__
-            raise ConfigurationError(f"base={name}: it has no method {method}, which the action mode needs")
         self.policy = policy
         self._begins = np.ones(n, dtype=bool)
         self._state: Any = None

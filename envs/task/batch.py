@@ -18,7 +18,7 @@ from ..perception.models import get_vestibular_model
 from ..platform.machines import Platform
 from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
 from .arrays import ALL, CORE, FRAME, NOTHING, BatchArrays, Launches, rules_of
-from .base import Base, RowsBase, Schedule, TaskBase, base_of
+from .base import Base, RowsBase, Schedule, TaskBase, base_of, gains_of
 from .episode import (
     DRIVE,
     MACHINE_STREAM,
@@ -78,7 +78,7 @@ class Batch:
         )
         self.platform = self.simulator.platforms[0]
         policy = base_of(base, options, self.platform)
-        self.action_size = len(policy.gain_names) if options.action.mode == "gains" else options.action.size
+        self.action_size = gains_of(policy) if options.action.mode == "gains" else options.action.size
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
         memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
@@ -106,7 +106,7 @@ class Batch:
             return Base()
         if self.options.action.mode == "gains":
             return Schedule(policy, self.n)
-        if getattr(policy, "task", None) is None:
+        if policy.task is None:
             return RowsBase(policy, self.n)
         return TaskBase(policy, self.options, self.simulator, self.drives, self.arrays)
 

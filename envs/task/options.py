@@ -159,7 +159,7 @@ def load_task(task: TaskOptions | str | Path | None = None, **fields: Any) -> Ta
         ConfigurationError: no task has this name, a field is unknown, of the wrong type or out of range.
     """
     source = "environment options" if task is None or isinstance(task, TaskOptions) else str(task)
-    start = TaskOptions() if task is None else task_of(task, source)
+    start = from_dict(TaskOptions, {} if task is None else task_values(task), source)
     if not fields:
         return start
     return from_dict(TaskOptions, merged_task(start, fields), source)
@@ -183,13 +183,11 @@ def _values_of(task: str | Path) -> object:
     return read_yaml(_PRESETS / f"{task}.yaml")
 
 
-def task_of(values: object, source: str = "task") -> TaskOptions:
-    """A task, from itself, its name or file, or plain values; these may name a ``preset`` they change."""
-    if isinstance(values, TaskOptions):
-        return values
+def task_values(values: object) -> Any:
+    """A task or plain values of one, for its name or file; values may name a ``preset`` that they change."""
     if isinstance(values, str | Path):
         values = _values_of(values)
     if isinstance(values, Mapping) and "preset" in values:
         rest = {name: value for name, value in values.items() if name != "preset"}
         return load_task(str(values["preset"]), **rest)
-    return from_dict(TaskOptions, values, source)
+    return values

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...baselines.mpc.parameters import MpcParameters
-from ...baselines.policy import TaskPolicy
+from ...baselines.policy import TaskPolicy, as_policy
 from ...baselines.registry import make_policy
 from ...baselines.washout import ScheduledWashout, WashoutParameters
 from ...baselines.washout.classical.policies import KNOBS
@@ -58,10 +58,9 @@ def base_of(base: Any, task: TaskOptions) -> Any:
         return None
     given = base or task.action.base or DEFAULT
     if isinstance(given, str | Path):
-        policy: Any = make_policy(given, platform_of(task))
-        given = policy if policy.task is not None else policy.parameters
-    known = (MpcParameters, *(FAMILIES[family].parameters for family in FAMILIES))
-    if not isinstance(given, (Agent, *known)):
+        made: Any = make_policy(given, platform_of(task))
+        given = made if made.task is not None else made.parameters
+    if not isinstance(given, _parameter_sets()) and as_policy(given).task is None:
         raise ConfigurationError(
             f"base {base or task.action.base}: an agent's file cannot hold it; take a washout, predictive "
             "control or an agent"
@@ -76,8 +75,8 @@ def base_policy(base: Any, task: TaskOptions) -> Any:
     held, platform = base_of(base, task), platform_of(task)
     if held is None:
         return None
-    if isinstance(held, Agent):
-        return held.for_platform(platform)
+    if not isinstance(held, _parameter_sets()):
+        return held.on(platform)
     if isinstance(held, MpcParameters):
         from ...baselines.mpc import make_mpc
 
@@ -85,6 +84,11 @@ def base_policy(base: Any, task: TaskOptions) -> Any:
     if task.action.mode == "gains":
         return ScheduledWashout(held, platform.cab)
     return make_washout(held, platform.cab)
+
+
+def _parameter_sets() -> tuple[type[Any], ...]:
+    """Classes of parameters that are enough to make a base policy of; else it is an agent."""
+    return (MpcParameters, *(FAMILIES[family].parameters for family in FAMILIES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +202,8 @@ class Agent(TaskPolicy):
         write(path, arrays, to_dict(contents))
 
     def _contents(self) -> tuple[Arrays, Contents]:
-        base = self.base._contents() if isinstance(self.base, Agent) else self.base
+        plain = self.base is None or isinstance(self.base, _parameter_sets())
+        base = self.base if plain else self.base._contents()
         return contents_of(self.name, self.task, self.network, self.record, base)
 
     @classmethod

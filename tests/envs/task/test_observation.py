@@ -290,7 +290,7 @@ assert "| `height` | 1 | m | 2 | 10 | how deep the cab hangs |" in observation_t
 def test_another_row_takes_one_page(tmp_path):
     """A row between others: declared and written on one page, and every other row stays right."""
     page = Path(layout_page.__file__).read_text(encoding="utf-8")
-    declared, written = '        Row("rate_error"', "    if f.command >= 0:"
+    declared, written = '        Row(\n            "rate_error"', "    if f.command >= 0:"
     assert page.count(declared) == page.count(written) == 1
     page = page.replace(
         declared, '        Row("height", 1, 2.0, "m", "how deep the cab hangs"),\n' + declared
