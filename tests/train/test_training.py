@@ -70,6 +70,11 @@ CASES = {
         "td3",
         {"hyperparameters": _NOISE, "normalize": _NOT_NORMALIZED},
     ),
+    "trpo, schedules": ("trpo", {"hyperparameters": {"learning_rate": "lin_1e-3"}}),
+    "crossq, batch renormalization after its warm-up": (
+        "crossq",
+        {"hyperparameters": {"policy_kwargs": {"renorm_warmup_steps": 5}, "policy_delay": 2}},
+    ),
     "tqc, several steps": ("tqc", {"hyperparameters": {"train_freq": 3, "gradient_steps": 2}}),
 }
 

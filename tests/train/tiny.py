@@ -9,7 +9,7 @@ import yaml
 
 from motion_cueing.train.config import TrainingConfig, load_config, merge
 
-ALGORITHMS = ("ppo", "sac", "td3", "tqc")
+ALGORITHMS = ("ppo", "trpo", "sac", "td3", "tqc", "crossq")
 
 _COMMON: dict[str, Any] = {
     "n_envs": 4,
@@ -32,7 +32,7 @@ _OFF_POLICY = {"learning_starts": 60, "batch_size": 16, "buffer_size": 240, "gra
 
 def values(algo: str, /, **fields: Any) -> dict[str, Any]:
     """Fields of a tiny configuration."""
-    hyperparameters = {"ppo": _ON_POLICY, "apg": _GRADIENT}.get(algo, _OFF_POLICY)
+    hyperparameters = {"ppo": _ON_POLICY, "trpo": _ON_POLICY, "apg": _GRADIENT}.get(algo, _OFF_POLICY)
     return merge({**_COMMON, "hyperparameters": hyperparameters}, fields)
 
 

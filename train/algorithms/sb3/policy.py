@@ -7,6 +7,8 @@ from typing import Any
 
 import torch
 from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
+from sb3_contrib.common.torch_layers import BatchRenorm1d
+from sb3_contrib.crossq.policies import CrossQPolicy
 from sb3_contrib.tqc.policies import TQCPolicy
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.distributions import DiagGaussianDistribution, Distribution
@@ -69,7 +71,7 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
     """``model.predict(deterministic=True)`` with the normalization before it.
 
     Args:
-        model: PPO, SAC, TD3, TQC, or another with their actor, on a flat observation.
+        model: PPO, TRPO, SAC, TD3, TQC, CrossQ, or another with their actor, on a flat observation.
         normalize: The wrapper the model was trained in; its running mean and variance go into the network.
 
     Raises:
@@ -81,7 +83,7 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         statistics: Any = normalize.obs_rms
         mean, variance, clip = statistics.mean.copy(), statistics.var.copy(), float(normalize.clip_obs)
     return Network(
-        *weights_of(linear_layers(layers)),
+        *weights_of(_folded(layers)),
         activation=_activation(layers),  # type: ignore[arg-type]
         squash="tanh" if squash else "clip",
         skip=skip,
@@ -104,9 +106,14 @@ def load_network(
         weight: Observations that mean and variance are counted for; new ones move them on.
 
     Raises:
-        DataError: the network is built in another way.
+        DataError: the network is built in another way, or the model has batch normalization.
     """
     layers, squash, skip = _actor(model)
+    if any(isinstance(layer, BatchRenorm1d) for layer in layers):
+        raise DataError(
+            "initial: an agent's file has no batch statistics, which CrossQ needs to go on; leave initial "
+            "out, or set hyperparameters.policy_kwargs.batch_norm to false"
+        )
     linear = linear_layers(layers)
     ours = ([tuple(layer.weight.shape) for layer in linear], _activation(layers), squash, skip)
     theirs = [w.shape for w in network.weights], network.activation, network.squash == "tanh", network.skip
@@ -138,11 +145,11 @@ def _load_statistics(network: Network, normalize: VecNormalize | None, weight: f
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
     """Layers from observation to action; whether a tanh follows; whether there is a skip connection."""
     if isinstance(model.policy, RecurrentActorCriticPolicy):
-        reason = "it has a memory, which no agent has; train PPO, SAC, TD3 or TQC"
-    elif isinstance(model.policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy):
+        reason = "it has a memory, which no agent has; train PPO, TRPO, SAC, TD3, TQC or CrossQ"
+    elif isinstance(model.policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy | CrossQPolicy):
         reason = ""
     else:
-        reason = "it is none of PPO, SAC, TD3 and TQC; make a motion_cueing.train.agents.Network of it"
+        reason = "it is none of PPO, TRPO, SAC, TD3, TQC and CrossQ; make a motion_cueing.train.agents.Network of it"
     if reason:
         raise DataError(f"{type(model).__name__}: network_of cannot convert its policy: {reason}")
     on_policy, td3 = isinstance(model.policy, ActorCriticPolicy), isinstance(model.policy, TD3Policy)
@@ -164,8 +171,37 @@ def _flat(module: nn.Module) -> list[nn.Module]:
     return list(module) if isinstance(module, nn.Sequential) else [module]
 
 
+def _folded(layers: Iterable[nn.Module]) -> list[nn.Linear]:
+    """Linear layers, each with the batch normalization before it made part of its weights."""
+    folded: list[nn.Linear] = []
+    before: BatchRenorm1d | None = None
+    for layer in layers:
+        if isinstance(layer, BatchRenorm1d):
+            before = layer
+        elif isinstance(layer, nn.Linear):
+            folded.append(layer if before is None else _fold(before, layer))
+            before = None
+    return folded
+
+
+@torch.no_grad()
+def _fold(normalization: BatchRenorm1d, layer: nn.Linear) -> nn.Linear:
+    """``layer`` on the normalized input, as one layer, with the running statistics as in evaluation."""
+    mean, variance = normalization.ra_mean.double(), normalization.ra_var.double()
+    gain = (variance + normalization.eps).rsqrt()
+    offset = -mean * gain
+    if normalization.affine:
+        scale = normalization.scale.double()
+        gain, offset = gain * scale, offset * scale + normalization.bias.double()
+    weight = layer.weight.double()
+    folded = nn.Linear(layer.in_features, layer.out_features)
+    folded.weight.copy_(weight * gain)
+    folded.bias.copy_(weight @ offset + layer.bias.double())
+    return folded
+
+
 def _activation(layers: Iterable[nn.Module]) -> str:
-    kinds = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
+    kinds = {type(layer) for layer in layers if not isinstance(layer, nn.Linear | BatchRenorm1d)}
     if not kinds:
         return "tanh"
     if len(kinds) > 1 or not kinds <= _NAMES.keys():

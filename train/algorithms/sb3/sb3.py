@@ -1,4 +1,4 @@
-"""Algorithms of Stable-Baselines3: PPO, SAC, TD3, and TQC of sb3-contrib.
+"""Algorithms of Stable-Baselines3 (PPO, SAC, TD3) and of sb3-contrib (TRPO, TQC, CrossQ).
 
 Hyperparameters are those of the class, as rl-baselines3-zoo writes them in YAML, checked against its
 signature.
@@ -14,7 +14,7 @@ from typing import Any, Final, get_type_hints
 import numpy as np
 import torch
 from pydantic import ConfigDict, TypeAdapter, ValidationError
-from sb3_contrib import TQC
+from sb3_contrib import TQC, TRPO, CrossQ
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -68,8 +68,8 @@ def arguments(
         algorithm: Its class.
         hyperparameters: As in rl-baselines3-zoo: numbers may be schedules (``lin_3e-4``); ``policy_kwargs``
             is a mapping, its ``activation_fn`` one of :data:`TORCH_ACTIVATIONS`. ``policy`` is "MlpPolicy"
-            or, for PPO, "SkipPolicy", with a skip connection. ``noise_type`` and ``noise_std`` make the
-            action noise.
+            or, for PPO and TRPO, "SkipPolicy", with a skip connection. ``noise_type`` and ``noise_std`` make
+            the action noise.
         action_size: Entries of an action.
 
     Raises:
@@ -90,7 +90,7 @@ def arguments(
 
 
 def _policy(algorithm: type[BaseAlgorithm], name: Any, use_sde: bool) -> Any:
-    known = {"MlpPolicy": "MlpPolicy"} | ({"SkipPolicy": SkipPolicy} if algorithm is PPO else {})
+    known = {"MlpPolicy": "MlpPolicy"} | ({"SkipPolicy": SkipPolicy} if algorithm in (PPO, TRPO) else {})
     if name not in known:
         raise ConfigurationError(f"hyperparameters.policy: {name!r}; use one of {', '.join(known)}")
     if known[name] is SkipPolicy and use_sde:
@@ -166,7 +166,14 @@ def _noise(given: Mapping[str, Any], size: int) -> Any:
 _NUMBER: Final = (int, float, np.number)
 _INITIAL_WEIGHT: Final = 1e5
 """Observations that the normalization of an initial agent counts for."""
-CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
+CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {
+    "ppo": PPO,
+    "trpo": TRPO,
+    "sac": SAC,
+    "td3": TD3,
+    "tqc": TQC,
+    "crossq": CrossQ,
+}
 
 
 class SB3Learner(Learner):

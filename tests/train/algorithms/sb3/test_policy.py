@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
-from sb3_contrib import ARS, CrossQ, RecurrentPPO
+from sb3_contrib import ARS, TRPO, RecurrentPPO
+from sb3_contrib.common.torch_layers import BatchRenorm1d
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecNormalize
@@ -30,6 +31,10 @@ def shaken(model) -> None:
     with torch.no_grad():
         for parameter in model.policy.parameters():
             parameter += 0.2 * torch.randn(parameter.shape, generator=generator)
+        for module in model.policy.modules():
+            if isinstance(module, BatchRenorm1d):
+                module.ra_mean.normal_(0.0, 0.5, generator=generator)
+                module.ra_var.uniform_(0.2, 2.0, generator=generator)
 
 
 def make(name: str, normalized: bool = True, **policy):
@@ -70,11 +75,12 @@ def test_activations_are_the_models(name, activation):
     assert np.allclose(network_of(model, normalize)(seen), expected, rtol=0.0, atol=1e-5)
 
 
-def test_a_policy_whose_last_layer_sees_the_observation_goes_to_a_network_and_back():
+@pytest.mark.parametrize("algorithm", [PPO, TRPO])
+def test_a_policy_whose_last_layer_sees_the_observation_goes_to_a_network_and_back(algorithm):
     models = []
     for seed in (1, 2):
         env = DrivingSimulatorVecEnv(2, episode=SHORT)
-        models.append(PPO(SkipPolicy, env, policy_kwargs={"net_arch": [16, 12]}, seed=seed))
+        models.append(algorithm(SkipPolicy, env, policy_kwargs={"net_arch": [16, 12]}, seed=seed))
         shaken(models[-1])
     network = network_of(models[0])
     seen = observations(SIZE)
@@ -93,9 +99,10 @@ def test_a_policy_whose_last_layer_sees_the_observation_goes_to_a_network_and_ba
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_policy_without_hidden_layers_is_one_layer(name):
-    model, normalize = make(name, net_arch=[] if name == "ppo" else [5])
+    none = name in ("ppo", "trpo")
+    model, normalize = make(name, net_arch=[] if none else [5])
     network = network_of(model, normalize)
-    assert len(network.weights) == (1 if name == "ppo" else 2)
+    assert len(network.weights) == (1 if none else 2)
     seen = observations(SIZE)
     expected, _ = model.predict(normalize.normalize_obs(seen), deterministic=True)
     assert np.allclose(network(seen), expected, rtol=0.0, atol=1e-5)
@@ -112,8 +119,9 @@ def test_the_network_does_not_change_with_the_model():
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_model_takes_over_a_network(name):
-    network = network_of(*make(name))
-    other, normalize = make(name)
+    plain = {"batch_norm": False} if name == "crossq" else {}
+    network = network_of(*make(name, **plain))
+    other, normalize = make(name, **plain)
     shaken(other)
     normalize.obs_rms.update(np.ones((10, SIZE)))
     assert not np.allclose(network_of(other, normalize)(observations(SIZE)), network(observations(SIZE)))
@@ -142,6 +150,12 @@ def test_a_network_that_does_not_fit_is_not_taken_over(name, normalized, policy,
         load_network(network, *make(name, normalized, **policy), 1.0)
 
 
+def test_a_network_has_no_batch_statistics_to_take_over():
+    network = network_of(*make("crossq"))
+    with pytest.raises(DataError, match="initial: an agent's file has no batch statistics"):
+        load_network(network, *make("crossq"), 1.0)
+
+
 class Twice(BaseFeaturesExtractor):
     """Something a network cannot hold."""
 
@@ -167,6 +181,7 @@ def test_what_a_network_cannot_hold_is_refused(policy, message):
 
 def test_noise_that_depends_on_the_state_is_refused_where_the_mean_goes_through_a_tanh():
     assert arguments(PPO, {"policy": "SkipPolicy"}, 9)["policy"] is SkipPolicy
+    assert arguments(TRPO, {"policy": "SkipPolicy"}, 9)["policy"] is SkipPolicy
     with pytest.raises(ConfigurationError, match=r"hyperparameters\.use_sde"):
         arguments(PPO, {"policy": "SkipPolicy", "use_sde": True}, 9)
     with pytest.raises(ConfigurationError, match=r"hyperparameters\.policy"):
@@ -178,7 +193,6 @@ def test_noise_that_depends_on_the_state_is_refused_where_the_mean_goes_through_
     [
         (RecurrentPPO, "MlpLstmPolicy", "RecurrentPPO: .* it has a memory, which no agent has; train PPO"),
         (ARS, "MlpPolicy", "ARS: .* make a motion_cueing.train.agents.Network of it"),
-        (CrossQ, "MlpPolicy", "CrossQ: .* make a motion_cueing.train.agents.Network of it"),
     ],
 )
 def test_models_of_other_kinds_are_refused_in_one_sentence(algorithm, policy, message):
