@@ -55,10 +55,10 @@ def _from_file(path: Path, platform: "Platform") -> "Agent":
 
 
 def _from_zip(path: Path, platform: "Platform") -> "Agent":
-    make = "Agent(name, task, network_of(model), Record(algo='ppo', seed=0)).save('NAME.safetensors')"
+    command = f"motion-cueing convert {path} --environment ID --out NAME.safetensors"
     raise DataError(
-        f"{path}: a model of Stable-Baselines3 does not say which environment it acts in; save it as an "
-        f"agent, by `{make}` with motion_cueing.train.algorithms.sb3.policy.network_of"
+        f"{path}: a model of Stable-Baselines3 does not say which environment it acts in; `{command}` makes "
+        "an agent of it; loading a model executes code in it, so convert only one that you trust"
     )
 
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
+import numpy as np
 import torch
+from gymnasium import spaces
 from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
 from sb3_contrib.common.torch_layers import BatchRenorm1d
 from sb3_contrib.crossq.policies import CrossQPolicy
 from sb3_contrib.tqc.policies import TQCPolicy
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.distributions import DiagGaussianDistribution, Distribution
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecNormalize
@@ -19,8 +23,12 @@ from stable_baselines3.sac.policies import SACPolicy
 from stable_baselines3.td3.policies import TD3Policy
 from torch import nn
 
+from ....envs import ENVIRONMENTS, provenance
 from ....envs.errors import DataError
-from ...agents import Network
+from ....envs.task import TaskOptions
+from ....envs.task.options import load_task
+from ...agents import Agent, Network, Record
+from ...agents.network import EPSILON
 from ...networks import TORCH_ACTIVATIONS, HiddenLayers, linear_layers, load_weights, weights_of
 
 
@@ -64,7 +72,47 @@ class SkipPolicy(ActorCriticPolicy):
         return self.action_dist.proba_distribution(torch.tanh(self.action_net(latent_pi)), self.log_std)
 
 
-_NAMES = {module: name for name, module in TORCH_ACTIVATIONS.items()}
+_KNOWN: Final = "PPO, TRPO, SAC, TD3, TQC and CrossQ"
+_NAMES: Final = {module: name for name, module in TORCH_ACTIVATIONS.items()}
+
+
+def agent_of(
+    model: BaseAlgorithm,
+    task: TaskOptions | str | Path,
+    name: str,
+    normalize: VecNormalize | None = None,
+    base: Any = None,
+) -> Agent:
+    """A model as an agent: its deterministic policy with its environment, which NumPy alone runs.
+
+    Args:
+        model: As :func:`network_of` takes it.
+        task: The environment it was trained in, by options, id, name or YAML file.
+        name: Of the agent.
+        normalize: The wrapper the model was trained in; None for the one it has now, if any.
+        base: The controller under the agent, as :class:`~...agents.Agent` takes it; None for the task's.
+
+    Raises:
+        DataError: the policy cannot become a network, or its sizes are not the task's; or the wrapper that
+            normalized its observations is missing.
+        ConfigurationError: there is no such task; or the base is missing or of no use.
+    """
+    options = load_task(ENVIRONMENTS.get(str(task), {"task": task}).get("task"))
+    normalize = normalize or model.get_vec_normalize_env()
+    # Algorithms on policy keep this only where they learned in VecNormalize.
+    if normalize is None and isinstance(model, OnPolicyAlgorithm) and model._last_original_obs is not None:
+        raise DataError(
+            f"{name}: the model was trained in VecNormalize; give its statistics too, normalize=..., "
+            "which VecNormalize.save writes"
+        )
+    record = Record(
+        algo=type(model).__name__.lower(),
+        seed=model.seed or 0,
+        steps=model.num_timesteps,
+        versions=provenance.versions(),
+        created=provenance.now(),
+    )
+    return Agent(name, options, network_of(model, normalize), record, base)
 
 
 def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> Network:
@@ -75,13 +123,16 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         normalize: The wrapper the model was trained in; its running mean and variance go into the network.
 
     Raises:
-        DataError: the policy is not a chain of linear layers with one kind of activation, or has a memory.
+        DataError: the policy is not a chain of linear layers with one kind of activation, or has a memory;
+            or its actions are no vector within one bound.
     """
     layers, squash, skip = _actor(model)
+    bound = _bound(model.action_space)
     mean, variance, clip = None, None, 10.0
     if normalize is not None and normalize.norm_obs:
         statistics: Any = normalize.obs_rms
-        mean, variance, clip = statistics.mean.copy(), statistics.var.copy(), float(normalize.clip_obs)
+        mean, clip = statistics.mean.copy(), float(normalize.clip_obs)
+        variance = statistics.var + (normalize.epsilon - EPSILON)
     return Network(
         *weights_of(_folded(layers)),
         activation=_activation(layers),  # type: ignore[arg-type]
@@ -90,8 +141,17 @@ def network_of(model: BaseAlgorithm, normalize: VecNormalize | None = None) -> N
         mean=mean,
         variance=variance,
         clip=clip,
-        bound=float(model.action_space.high.flat[0]),
+        bound=bound,
     )
+
+
+def _bound(space: spaces.Space[Any]) -> float:
+    """The largest absolute value of an action, the same in every entry."""
+    if isinstance(space, spaces.Box):
+        high = float(space.high.flat[0])
+        if len(space.shape) == 1 and np.all(space.high == high) and np.all(space.low == -high):
+            return high
+    raise DataError(f"the model's actions are {space}; those of an agent are a vector within +-bound")
 
 
 def load_network(
@@ -145,11 +205,11 @@ def _load_statistics(network: Network, normalize: VecNormalize | None, weight: f
 def _actor(model: BaseAlgorithm) -> tuple[list[nn.Module], bool, bool]:
     """Layers from observation to action; whether a tanh follows; whether there is a skip connection."""
     if isinstance(model.policy, RecurrentActorCriticPolicy):
-        reason = "it has a memory, which no agent has; train PPO, TRPO, SAC, TD3, TQC or CrossQ"
+        reason = f"it has a memory, which no agent has; train {_KNOWN}"
     elif isinstance(model.policy, ActorCriticPolicy | SACPolicy | TD3Policy | TQCPolicy | CrossQPolicy):
         reason = ""
     else:
-        reason = "it is none of PPO, TRPO, SAC, TD3, TQC and CrossQ; make a motion_cueing.train.agents.Network of it"
+        reason = f"it is none of {_KNOWN}; make a motion_cueing.train.agents.Network of it"
     if reason:
         raise DataError(f"{type(model).__name__}: network_of cannot convert its policy: {reason}")
     on_policy, td3 = isinstance(model.policy, ActorCriticPolicy), isinstance(model.policy, TD3Policy)
@@ -187,8 +247,8 @@ def _folded(layers: Iterable[nn.Module]) -> list[nn.Linear]:
 @torch.no_grad()
 def _fold(normalization: BatchRenorm1d, layer: nn.Linear) -> nn.Linear:
     """``layer`` on the normalized input, as one layer, with the running statistics as in evaluation."""
-    mean, variance = normalization.ra_mean.double(), normalization.ra_var.double()
-    gain = (variance + normalization.eps).rsqrt()
+    mean = normalization.get_buffer("ra_mean").double()
+    gain = (normalization.get_buffer("ra_var").double() + normalization.eps).rsqrt()
     offset = -mean * gain
     if normalization.affine:
         scale = normalization.scale.double()

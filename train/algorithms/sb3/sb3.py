@@ -45,7 +45,7 @@ NOISES: Final[Mapping[str, Any]] = {
 
 _NOISE: Final = ("noise_type", "noise_std")
 _POLICY: Final = "policy"
-_OURS: Final = {
+OURS: Final = {
     "self", "policy", "env", "verbose", "seed", "device", "tensorboard_log", "stats_window_size",
     "action_noise", "rollout_buffer_class", "rollout_buffer_kwargs", "replay_buffer_class",
     "replay_buffer_kwargs", "optimize_memory_usage", "_init_setup_model",
@@ -75,7 +75,7 @@ def arguments(
     Raises:
         ConfigurationError: one is unknown or of the wrong type.
     """
-    known = _parameters(algorithm, _OURS)
+    known = parameters(algorithm, OURS)
     noisy = "action_noise" in inspect.signature(algorithm).parameters
     _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *(_NOISE if noisy else ())])
     given = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
@@ -98,7 +98,7 @@ def _policy(algorithm: type[BaseAlgorithm], name: Any, use_sde: bool) -> Any:
     return known[name]
 
 
-def _parameters(cls: type[Any], ours: set[str]) -> dict[str, Any]:
+def parameters(cls: type[Any], ours: set[str]) -> dict[str, Any]:
     """What a class can be given in a file, with its types."""
     constructor: Any = cls.__init__
     annotations = {
@@ -119,7 +119,7 @@ def _policy_kwargs(algorithm: type[BaseAlgorithm], given: Any) -> dict[str, Any]
     where = "hyperparameters.policy_kwargs"
     if not isinstance(given, Mapping):
         raise ConfigurationError(f"{where}: expected fields with values, found {given!r}")
-    known = _parameters(algorithm.policy_aliases["MlpPolicy"], _OURS_OF_POLICY)
+    known = parameters(algorithm.policy_aliases["MlpPolicy"], _OURS_OF_POLICY)
     _refuse_unknown(where, given, list(known))
     checked = dict(given)
     if "activation_fn" in checked:
