@@ -45,8 +45,11 @@ def train_stopped(folder: RunFolder, *stops: int):
 
 
 def same_networks(one, other) -> bool:
-    a, b = Agent.load(one).network, Agent.load(other).network
-    arrays = [[*n.weights, *n.biases, *([] if n.mean is None else [n.mean, n.variance])] for n in (a, b)]
+    arrays = [
+        [*n.head.weights, *n.head.biases, *(x for layer in n.lstm for x in layer)]
+        + ([] if n.mean is None else [n.mean, n.variance])
+        for n in (Agent.load(one).network, Agent.load(other).network)
+    ]
     return all(np.array_equal(x, y) for x, y in zip(*arrays, strict=True))
 
 
@@ -71,6 +74,10 @@ CASES = {
         {"hyperparameters": _NOISE, "normalize": _NOT_NORMALIZED},
     ),
     "trpo, schedules": ("trpo", {"hyperparameters": {"learning_rate": "lin_1e-3"}}),
+    "recurrent-ppo, two layers": (
+        "recurrent-ppo",
+        {"hyperparameters": {"policy_kwargs": {"n_lstm_layers": 2}, "learning_rate": "lin_1e-3"}},
+    ),
     "crossq, batch renormalization after its warm-up": (
         "crossq",
         {"hyperparameters": {"policy_kwargs": {"renorm_warmup_steps": 5}, "policy_delay": 2}},
@@ -117,7 +124,7 @@ def test_a_training_that_is_complete_stays_as_it_is_and_can_be_lengthened(tmp_pa
     assert RunFolder.open(folder.path).config.steps == 400
 
 
-@pytest.mark.parametrize("algo", ["ppo", "td3"])
+@pytest.mark.parametrize("algo", ["ppo", "recurrent-ppo", "td3"])
 def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     first = RunFolder.create(tmp_path / "first", tiny.config(tmp_path, algo))
     Training(first).train()
@@ -126,9 +133,9 @@ def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     network = Agent.load(first.final_agent).network
     seen = np.random.default_rng(0).normal(size=(50, network.size)).astype(np.float32)
     training = Training(second)
-    assert np.array_equal(training.learner.network()(seen), network(seen))
+    assert np.array_equal(training.learner.network().step(seen)[0], network.step(seen)[0])
     training.train()
-    assert not np.array_equal(Agent.load(second.final_agent).network(seen), network(seen))
+    assert not np.array_equal(Agent.load(second.final_agent).predict(seen)[0], network.step(seen)[0])
     origin = Agent.load(first.final_agent).record
     assert Agent.load(second.final_agent).record.initial == origin
     # What is resumed no longer needs the agent it began with.

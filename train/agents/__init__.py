@@ -17,12 +17,15 @@ if TYPE_CHECKING:
     from ...envs.platform.machines import Platform
     from .agent import Agent, find_agent, get_agent
     from .files import Record
-    from .network import Network
+    from .network import Network, PolicyNetwork
+    from .recurrent import RecurrentNetwork
 
 _LAZY = {
     "Agent": ".agent",
     "Network": ".network",
+    "PolicyNetwork": ".network",
     "Record": ".files",
+    "RecurrentNetwork": ".recurrent",
     "find_agent": ".agent",
     "get_agent": ".agent",
 }
@@ -30,7 +33,9 @@ _LAZY = {
 __all__ = [
     "Agent",
     "Network",
+    "PolicyNetwork",
     "Record",
+    "RecurrentNetwork",
     "agent_names",
     "describe_policy",
     "find_agent",

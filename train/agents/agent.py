@@ -30,7 +30,7 @@ from ...envs.task.options import TaskOptions
 from . import names
 from .files import Arrays, Contents, Record, arrays_below, contents_of, network_of, read, write
 from .names import SUFFIX, description_of
-from .network import Array, Network
+from .network import Array, PolicyNetwork
 
 DEFAULT: Final = "classical"
 """The washout where one is needed and none is named."""
@@ -106,7 +106,7 @@ class Agent(TaskPolicy):
 
     name: str = field()
     task: TaskOptions = field()
-    network: Network = field()
+    network: PolicyNetwork = field()
     record: Record = field()
     base: Any = None
 
@@ -169,15 +169,17 @@ class Agent(TaskPolicy):
     ) -> tuple[Array, Any]:
         """Actions within the bound, (n, k) or (k,), for observations (n, size) or (size,) of its environment.
 
+        The state of a network with a memory is an array with a row an environment.
+
         Raises:
-            DataError: the observation has the wrong shape, or is not finite.
+            DataError: the observation has the wrong shape, or is not finite; or the state is of others.
         """
         values = np.asarray(observation, dtype=np.float32)
         if values.ndim not in (1, 2) or values.shape[-1] != self.network.size:
             raise DataError(f"observation has shape {values.shape}, expected (n, {self.network.size})")
         if not np.isfinite(values).all():
             raise DataError("observation is not finite")
-        return self.network(values), state
+        return self.network.step(values, state, episode_start)
 
     def on(self, platform: Platform | str) -> Agent:
         """The same agent on another machine than it was trained on.

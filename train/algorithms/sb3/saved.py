@@ -11,11 +11,13 @@ import zipfile
 from pathlib import Path
 from typing import Any, Final
 
+from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
 from ....envs.errors import DataError, look_up
-from .sb3 import CLASSES, OURS, parameters
+from .policy import CLASSES
+from .sb3 import OURS, parameters
 
 _UNUSED: Final[dict[str, Any]] = {
     "learning_rate": 0.0,
@@ -31,7 +33,7 @@ def load_model(path: str | Path, algorithm: str | None = None) -> BaseAlgorithm:
 
     Args:
         path: Its ``.zip`` file.
-        algorithm: One of :data:`~.sb3.CLASSES`; None to find out.
+        algorithm: One of :data:`~.policy.CLASSES`; None to find out.
 
     Raises:
         DataError: the file is missing or broken, or no model of such an algorithm.
@@ -60,14 +62,18 @@ def algorithm_in(path: str | Path) -> str | None:
     """
     try:
         with zipfile.ZipFile(path) as file:
-            held = json.loads(file.read("data")).keys()
+            held = json.loads(file.read("data"))
+            recurrent = RecurrentActorCriticPolicy.__module__ == held["policy_class"]["__module__"]
     except FileNotFoundError:
         raise DataError(f"{path}: there is no such file") from None
-    except (zipfile.BadZipFile, KeyError, ValueError, AttributeError, OSError):
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, OSError):
         raise DataError(f"{path}: no model of Stable-Baselines3, or broken; model.save writes one") from None
     # Every algorithm has names that no other one has; early versions lack n_steps off policy.
     needed = {name: parameters(kind, OURS).keys() - {"n_steps"} for name, kind in CLASSES.items()}
-    fitting = [name for name, names in needed.items() if names <= held]
+    fitting = [name for name, names in needed.items() if names <= held.keys()]
+    if recurrent:
+        # It has the hyperparameters of PPO.
+        return "recurrent-ppo" if "recurrent-ppo" in fitting else None
     return max(fitting, key=lambda name: len(needed[name]), default=None)
 
 

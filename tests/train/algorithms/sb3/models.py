@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.envs.task.options import TaskOptions, load_task
-from motion_cueing.train.algorithms.sb3.sb3 import CLASSES
+from motion_cueing.train.algorithms.sb3.policy import CLASSES
 
 ID = "motion_cueing/CueingPreview-v0"
 NAME = "cueing-preview"
@@ -44,9 +44,10 @@ def learned(algo: str, normalized: bool = True, steps: int = 16, **policy) -> Ba
     if normalized:
         env = VecNormalize(env, clip_obs=3.0)
     env.seed(1)
-    hyperparameters = _ON_POLICY if algo in ("ppo", "trpo") else _OFF_POLICY
+    hyperparameters = _ON_POLICY if algo in ("ppo", "trpo", "recurrent-ppo") else _OFF_POLICY
     kwargs = {"net_arch": [16, 12], **policy}
-    model = CLASSES[algo]("MlpPolicy", env, seed=3, policy_kwargs=kwargs, **hyperparameters)
+    name = "MlpLstmPolicy" if algo == "recurrent-ppo" else "MlpPolicy"
+    model = CLASSES[algo](name, env, seed=3, policy_kwargs=kwargs, **hyperparameters)
     return model.learn(steps)
 
 

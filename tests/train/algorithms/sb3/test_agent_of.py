@@ -11,9 +11,8 @@ from stable_baselines3.common.envs import IdentityEnv
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.task.options import load_task
 from motion_cueing.train.agents import Agent
-from motion_cueing.train.algorithms.sb3.policy import agent_of
+from motion_cueing.train.algorithms.sb3.policy import CLASSES, agent_of
 from motion_cueing.train.algorithms.sb3.saved import algorithm_in, load_model, load_statistics
-from motion_cueing.train.algorithms.sb3.sb3 import CLASSES
 
 from .models import ID, NAME, Spaces, actions, learned, seen
 
@@ -96,6 +95,9 @@ def test_files_that_hold_something_else_are_refused(tmp_path):
         load_model(path)
     with pytest.raises(UnknownNameError, match="unknown algorithm 'pppo'"):
         load_model(path, "pppo")
+    learned("ppo").policy.save(path)
+    with pytest.raises(DataError, match="no model of Stable-Baselines3, or broken"):
+        load_model(path)
     learned("sac", steps=0).save(path)
     with pytest.raises(DataError, match="cannot be loaded as a model of ppo"):
         load_model(path, "ppo")
