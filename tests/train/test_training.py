@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.run import RunFolder, checkpoints_in, read_checkpoint, write_checkpoint
 from motion_cueing.train.training import Training
 
 from . import tiny
+from .agents import RECORD, recurrent
 
 pytestmark = pytest.mark.slow
 
@@ -144,6 +146,15 @@ def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     longer.extend(400)
     assert not Training(longer).train().interrupted
     assert Agent.load(second.final_agent).record.initial == origin
+
+
+def test_an_algorithm_without_memory_does_not_begin_with_one(tmp_path):
+    task = tiny.config(tmp_path, "apg", normalize=_NOT_NORMALIZED).task
+    size = layout_of(task.observation, task.action.mode, 9).size
+    Agent("lstm", task, recurrent(size), RECORD).save(tmp_path / "lstm.safetensors")
+    config = tiny.config(tmp_path, "apg", initial=str(tmp_path / "lstm.safetensors"))
+    with pytest.raises(DataError, match="initial: apg trains no network with a memory, which the agent has"):
+        Training(RunFolder.create(tmp_path / "run", config))
 
 
 def test_only_the_latest_checkpoints_are_kept(tmp_path):

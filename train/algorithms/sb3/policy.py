@@ -110,7 +110,9 @@ def agent_of(
             normalized its observations is missing.
         ConfigurationError: there is no such task; or the base is missing or of no use.
     """
-    options = load_task(ENVIRONMENTS.get(str(task), {"task": task}).get("task"))
+    # ``gymnasium.make`` takes an id with the module that registers it before.
+    environment = str(task).removeprefix("motion_cueing.envs:")
+    options = load_task(ENVIRONMENTS.get(environment, {"task": task}).get("task"))
     normalize = normalize or model.get_vec_normalize_env()
     # Algorithms on policy keep this only where they learned in VecNormalize.
     if normalize is None and isinstance(model, OnPolicyAlgorithm) and model._last_original_obs is not None:

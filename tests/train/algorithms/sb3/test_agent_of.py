@@ -8,6 +8,7 @@ from gymnasium import spaces
 from stable_baselines3 import A2C, PPO
 from stable_baselines3.common.envs import IdentityEnv
 
+from motion_cueing.envs import ENVIRONMENT_ID
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.task.options import load_task
 from motion_cueing.train.agents import Agent
@@ -31,6 +32,19 @@ def test_a_saved_model_acts_as_an_agent(algo, tmp_path):
     observations = seen(model)
     found, _ = Agent.load(tmp_path / "mine.safetensors").predict(observations)
     np.testing.assert_allclose(found, actions(model, observations), rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("task", [ID, f"motion_cueing.envs:{ID}", NAME, load_task(NAME)])
+def test_an_environment_has_an_id_a_name_and_options(task):
+    assert agent_of(learned("ppo"), task, "mine").task == load_task(NAME)
+
+
+def test_an_environment_has_a_file_and_the_raw_one_all_defaults(tmp_path):
+    path = tmp_path / "task.yaml"
+    path.write_text(f"preset: {NAME}\nepisode: {{duration: 7.0}}\n")
+    assert agent_of(learned("ppo"), path, "mine").task.episode.duration == 7.0
+    with pytest.raises(DataError, match="its network has 155 entries of observation, its task"):
+        agent_of(learned("ppo"), ENVIRONMENT_ID, "mine")
 
 
 @pytest.mark.parametrize("normalized", [False, True])

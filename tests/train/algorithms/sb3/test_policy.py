@@ -184,6 +184,13 @@ def test_a_network_that_does_not_fit_is_not_taken_over(name, normalized, policy,
         load_network(network, *make(name, normalized, **policy), 1.0)
 
 
+def test_a_network_with_a_memory_is_taken_over_by_its_like_alone():
+    network = network_of(*make("recurrent-ppo"))
+    for name, policy in (("ppo", {}), ("recurrent-ppo", {"lstm_hidden_size": 6})):
+        with pytest.raises(DataError, match=r"it has LSTM layers \[7, 7\], hidden layers \[16, 12\]"):
+            load_network(network, *make(name, **policy), 1.0)
+
+
 def test_a_network_has_no_batch_statistics_to_take_over():
     network = network_of(*make("crossq"))
     with pytest.raises(DataError, match="initial: an agent's file has no batch statistics"):
