@@ -108,6 +108,13 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "--policy learned --out learned.onnx",
         "docs/guides/export-an-agent.md says how to run the file",
     ),
+    "convert": Command(
+        ".convert",
+        "ConvertCommand",
+        "turn a model of Stable-Baselines3 into an agent",
+        "model.zip --environment motion_cueing/CueingPreview-v0 --out mine.safetensors",
+        "`motion-cueing evaluate --policies mine.safetensors classical` compares it",
+    ),
     "train": Command(
         ".train",
         "TrainCommand",

@@ -197,13 +197,18 @@ def run_population(command: PopulationCommand) -> int:
     return train_with(population, where)
 
 
-def check(command: TrainingOptions) -> None:
-    """Refuse options that do not go together."""
+def check_installed() -> None:
+    """Refuse to go on without the libraries of trainings."""
     missing = [name for name in _NEEDED if find_spec(name) is None]
     if missing:
         raise ConfigurationError(
             f"training needs {', '.join(missing)}: pip install 'motion-cueing-gym[train]'"
         )
+
+
+def check(command: TrainingOptions) -> None:
+    """Refuse options that do not go together."""
+    check_installed()
     for name in ("workers", "trials", "members"):
         value = getattr(command, name, None)
         if value is not None and value < 1:

@@ -17,8 +17,8 @@ from motion_cueing.baselines import ClassicalWashout
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.task import ActionOptions, EpisodeOptions, ObservationOptions, TaskOptions
 from motion_cueing.evaluation import measure, rollout
-from motion_cueing.train.agents import Agent, Record
-from motion_cueing.train.algorithms.sb3.policy import network_of
+from motion_cueing.train.agents import Agent
+from motion_cueing.train.algorithms.sb3.policy import agent_of
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 TASK = TaskOptions(
@@ -36,8 +36,7 @@ def train(steps: int) -> Agent:
     model = PPO("MlpPolicy", envs, n_steps=128, batch_size=2048, gamma=0.97, seed=0, device="cpu",
                 learning_rate=1e-3, policy_kwargs={"log_std_init": -1.5})  # fmt: skip
     model.learn(steps)
-    record = Record(algo="ppo", seed=0, steps=model.num_timesteps)
-    return Agent("stable-baselines3", TASK, network_of(model, envs), record, base="classical")
+    return agent_of(model, TASK, "stable-baselines3", base="classical")
 
 
 def main(steps: str = "200000", maneuver: str = "lane-change") -> None:

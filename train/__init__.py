@@ -8,8 +8,8 @@ The shipped agents by name, and one of your own by file::
     agent = Agent.load("runs/ppo-1/best.safetensors")
     action, _ = agent.predict(observation)
 
-A model of Stable-Baselines3 becomes an agent by ``motion_cueing.train.algorithms.sb3.policy.network_of``. An
-algorithm of another package takes part by :func:`register`.
+A model of Stable-Baselines3 becomes an agent by ``motion_cueing.train.algorithms.sb3.policy.agent_of``, its
+file by ``motion-cueing convert``. An algorithm of another package takes part by :func:`register`.
 """
 
 from .registry import Learner, register

@@ -19,7 +19,7 @@ from ..envs.errors import DataError
 from ..envs.registry import Registry
 
 if TYPE_CHECKING:
-    from .agents import Network
+    from .agents import PolicyNetwork
     from .config import TrainingConfig
 
 Boundary = Callable[[], None]
@@ -82,7 +82,7 @@ class Learner(ABC):
         """What there is to log, means since the last call: ``rollout/...``, ``terms/...``, ``train/...``."""
 
     @abstractmethod
-    def network(self) -> Network:
+    def network(self) -> PolicyNetwork:
         """The deterministic policy as it is now."""
 
     @abstractmethod
@@ -104,9 +104,12 @@ ALGORITHMS: Final = Registry[type[Learner]]("algorithm", "motion_cueing.algorith
 _SHIPPED: Final = "motion_cueing.train.algorithms"
 for _name, _place, _summary in (
     ("ppo", "sb3.sb3:SB3Learner", "proximal policy optimization"),
+    ("trpo", "sb3.sb3:SB3Learner", "trust region policy optimization"),
+    ("recurrent-ppo", "sb3.sb3:SB3Learner", "proximal policy optimization of a network with a memory (LSTM)"),
     ("sac", "sb3.sb3:SB3Learner", "soft actor-critic"),
     ("td3", "sb3.sb3:SB3Learner", "twin delayed deep deterministic policy gradient"),
     ("tqc", "sb3.sb3:SB3Learner", "truncated quantile critics"),
+    ("crossq", "sb3.sb3:SB3Learner", "soft actor-critic with batch normalization, without target networks"),
     ("apg", "apg.apg:ApgLearner", "analytic policy gradient, through the simulator"),
     ("dagger", "dagger.dagger:DaggerLearner", "imitation of a controller, with dataset aggregation"),
     ("linear", "linear.linear:LinearLearner", "the best linear washout, by evolution: a start for apg"),

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..baselines import ClassicalWashout
-from ..envs.errors import ConfigurationError
+from ..envs.errors import ConfigurationError, DataError
 from ..envs.progress import Interrupt
 from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.episode import platform_of
-from .agents import Agent, Network, Record
+from .agents import Agent, PolicyNetwork, Record
 from .agents.agent import DEFAULT, base_of
 from .config import Measure, TrainingConfig
 from .logs import TrainingLog
@@ -36,7 +36,7 @@ def initial_agent(config: TrainingConfig) -> Agent | None:
     return None if config.initial is None else Agent.load(config.initial)
 
 
-def initial_network(config: TrainingConfig) -> Network | None:
+def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
     """Its network.
 
     Raises:
@@ -58,8 +58,10 @@ def start_actor(actor: Actor, batch: Batch, config: TrainingConfig) -> None:
     network = initial_network(config)
     if network is None:
         start_as_spring_damper(actor, batch)
+    elif network.lstm:
+        raise DataError(f"initial: {config.algo} trains no network with a memory, which the agent has")
     else:
-        actor.load(network)
+        actor.load(network.head)
 
 
 def check_episodes(config: TrainingConfig, why: str) -> None:
@@ -230,7 +232,7 @@ class Training:
 
     def _validate(self) -> None:
         network, status = self.learner.network(), self.status
-        score = self.validation.score(network)
+        score = self.validation.score(network.acting())
         status.score, status.news = score, True
         self.log.write(status.steps, score.scalars())
         value = rating(score, self.config.validation.best)

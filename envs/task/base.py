@@ -116,13 +116,8 @@ class Base:
         """Go on from a snapshot."""
 
 
-class RowsBase(Base):
-    """A policy that sees the simulator's rows.
-
-    Its state is None, an array with a row, or a list with an item for each environment.
-    """
-
-    every = 1
+class _Remembering(Base):
+    """A policy whose state is None, an array with a row, or a list with an item for each environment."""
 
     def __init__(self, policy: Any, n: int) -> None:
         self.policy = policy
@@ -133,21 +128,12 @@ class RowsBase(Base):
         """Episodes begin in the masked environments."""
         self._begins |= mask
 
-    def _answer(self, observation: Array, gains: Array | None, begins: Mask) -> tuple[Any, Any]:
-        answer: tuple[Any, Any] = self.policy.predict(observation, self._state, begins, deterministic=True)
-        return answer
-
-    def act(
-        self, observation: Array, out: Array, gains: Array | None = None, mask: Mask | None = None
-    ) -> None:
-        """Write what the policy does; see :class:`Base`."""
-        action, state = self._answer(observation, gains, self._begins.copy())
-        action = np.reshape(action, out.shape)
+    def _remember(self, state: Any, mask: Mask | None) -> None:
+        """Keep the next state of the masked environments, of all where there is none yet."""
         if mask is None or self._state is None or state is None:
-            out[...], self._state = action, state
+            self._state = state
             self._begins[...] = False
             return
-        out[mask] = action[mask]
         self._state = copy.copy(self._state)
         for i in np.flatnonzero(mask).tolist():
             self._state[i] = state[i]
@@ -160,8 +146,31 @@ class RowsBase(Base):
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot."""
-        self._begins[...] = snapshot["base_begins"]
+        # Early versions kept none for an agent.
+        self._begins[...] = snapshot.get("base_begins", False)
         self._state = copy.deepcopy(snapshot.get("base_state"))
+
+
+class RowsBase(_Remembering):
+    """A policy that sees the simulator's rows."""
+
+    every = 1
+
+    def _answer(self, observation: Array, gains: Array | None, begins: Mask) -> tuple[Any, Any]:
+        answer: tuple[Any, Any] = self.policy.predict(observation, self._state, begins, deterministic=True)
+        return answer
+
+    def act(
+        self, observation: Array, out: Array, gains: Array | None = None, mask: Mask | None = None
+    ) -> None:
+        """Write what the policy does; see :class:`Base`."""
+        action, state = self._answer(observation, gains, self._begins.copy())
+        action = np.reshape(action, out.shape)
+        if mask is None or self._state is None or state is None:
+            out[...] = action
+        else:
+            out[mask] = action[mask]
+        self._remember(state, mask)
 
 
 class Schedule(RowsBase):
@@ -174,7 +183,7 @@ class Schedule(RowsBase):
         return answer
 
 
-class TaskBase(Base):
+class TaskBase(_Remembering):
     """An agent, with the observations and actions of its own environment on the machines of the batch.
 
     Args:
@@ -206,7 +215,8 @@ class TaskBase(Base):
                 f"base {policy.name}: it acts every {repeat} time steps, of which action.repeat "
                 f"{options.action.repeat} is no multiple"
             )
-        self.policy, self.every = policy, repeat
+        super().__init__(policy, simulator.n)
+        self.every = repeat
         layout = layout_of(task.observation, task.action.mode, task.action.size)
         memory = low_passed(drives, task.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, simulator.device)
@@ -216,7 +226,8 @@ class TaskBase(Base):
         self._commanded = self.arrays.command.view["commanded"]
 
     def begin(self, mask: Mask) -> None:
-        """Forget the last action where episodes begin."""
+        """Forget the last action where episodes begin, and all that the agent remembers."""
+        super().begin(mask)
         self._launches.forget()
 
     def act(
@@ -225,7 +236,9 @@ class TaskBase(Base):
         """Write what the agent does; see :class:`Base`."""
         arrays = self.arrays
         self._launches.look(mask is not None, FRAME)
-        action, _ = self.policy.predict(arrays.observation.pull(), None, None, deterministic=True)
+        seen, begins = arrays.observation.pull(), self._begins
+        action, state = self.policy.predict(seen, self._state, begins, deterministic=True)
+        self._remember(state, mask)
         arrays.action.view[...] = action
         arrays.action.push()
         self._launches.ask(mask is not None)
@@ -234,10 +247,12 @@ class TaskBase(Base):
 
     def snapshot(self) -> Snapshot:
         """The memory, for :meth:`restore`."""
-        return {f"base.{name}": bytes_of(mirror.array) for name, mirror in self.arrays.changing()}
+        changing = {f"base.{name}": bytes_of(mirror.array) for name, mirror in self.arrays.changing()}
+        return changing | super().snapshot()
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot."""
+        super().restore(snapshot)
         for name, mirror in self.arrays.changing():
             put_bytes(mirror.array, f"base.{name}", snapshot)
             mirror.pull()

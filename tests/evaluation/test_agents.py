@@ -90,7 +90,7 @@ def test_the_command_refuses_what_does_not_fit(tmp_path, monkeypatch, capsys):
     for policy, platform, told in (
         ("mine.safetensors", "nads-1", "made for the motion base 'paper', not 'nads-1'"),
         ("cut.safetensors", "paper", "broken or cut off"),
-        ("model.zip", "paper", "with motion_cueing.train.algorithms.sb3.policy.network_of"),
+        ("model.zip", "paper", "`motion-cueing convert model.zip --environment ID"),
     ):
         words = ["evaluate", "--policies", policy, "--platform", platform, "--out", "out"]
         assert main(words) == 2

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.run import RunFolder, checkpoints_in, read_checkpoint, write_checkpoint
 from motion_cueing.train.training import Training
 
 from . import tiny
+from .agents import RECORD, recurrent
 
 pytestmark = pytest.mark.slow
 
@@ -45,8 +47,11 @@ def train_stopped(folder: RunFolder, *stops: int):
 
 
 def same_networks(one, other) -> bool:
-    a, b = Agent.load(one).network, Agent.load(other).network
-    arrays = [[*n.weights, *n.biases, *([] if n.mean is None else [n.mean, n.variance])] for n in (a, b)]
+    arrays = [
+        [*n.head.weights, *n.head.biases, *(x for layer in n.lstm for x in layer)]
+        + ([] if n.mean is None else [n.mean, n.variance])
+        for n in (Agent.load(one).network, Agent.load(other).network)
+    ]
     return all(np.array_equal(x, y) for x, y in zip(*arrays, strict=True))
 
 
@@ -69,6 +74,15 @@ CASES = {
     "td3, noise that remembers, nothing normalized": (
         "td3",
         {"hyperparameters": _NOISE, "normalize": _NOT_NORMALIZED},
+    ),
+    "trpo, schedules": ("trpo", {"hyperparameters": {"learning_rate": "lin_1e-3"}}),
+    "recurrent-ppo, two layers": (
+        "recurrent-ppo",
+        {"hyperparameters": {"policy_kwargs": {"n_lstm_layers": 2}, "learning_rate": "lin_1e-3"}},
+    ),
+    "crossq, batch renormalization after its warm-up": (
+        "crossq",
+        {"hyperparameters": {"policy_kwargs": {"renorm_warmup_steps": 5}, "policy_delay": 2}},
     ),
     "tqc, several steps": ("tqc", {"hyperparameters": {"train_freq": 3, "gradient_steps": 2}}),
 }
@@ -112,7 +126,7 @@ def test_a_training_that_is_complete_stays_as_it_is_and_can_be_lengthened(tmp_pa
     assert RunFolder.open(folder.path).config.steps == 400
 
 
-@pytest.mark.parametrize("algo", ["ppo", "td3"])
+@pytest.mark.parametrize("algo", ["ppo", "recurrent-ppo", "td3"])
 def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     first = RunFolder.create(tmp_path / "first", tiny.config(tmp_path, algo))
     Training(first).train()
@@ -121,9 +135,9 @@ def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     network = Agent.load(first.final_agent).network
     seen = np.random.default_rng(0).normal(size=(50, network.size)).astype(np.float32)
     training = Training(second)
-    assert np.array_equal(training.learner.network()(seen), network(seen))
+    assert np.array_equal(training.learner.network().step(seen)[0], network.step(seen)[0])
     training.train()
-    assert not np.array_equal(Agent.load(second.final_agent).network(seen), network(seen))
+    assert not np.array_equal(Agent.load(second.final_agent).predict(seen)[0], network.step(seen)[0])
     origin = Agent.load(first.final_agent).record
     assert Agent.load(second.final_agent).record.initial == origin
     # What is resumed no longer needs the agent it began with.
@@ -132,6 +146,15 @@ def test_a_training_begins_with_the_network_of_another(algo, tmp_path):
     longer.extend(400)
     assert not Training(longer).train().interrupted
     assert Agent.load(second.final_agent).record.initial == origin
+
+
+def test_an_algorithm_without_memory_does_not_begin_with_one(tmp_path):
+    task = tiny.config(tmp_path, "apg", normalize=_NOT_NORMALIZED).task
+    size = layout_of(task.observation, task.action.mode, 9).size
+    Agent("lstm", task, recurrent(size), RECORD).save(tmp_path / "lstm.safetensors")
+    config = tiny.config(tmp_path, "apg", initial=str(tmp_path / "lstm.safetensors"))
+    with pytest.raises(DataError, match="initial: apg trains no network with a memory, which the agent has"):
+        Training(RunFolder.create(tmp_path / "run", config))
 
 
 def test_only_the_latest_checkpoints_are_kept(tmp_path):

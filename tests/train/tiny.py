@@ -9,7 +9,7 @@ import yaml
 
 from motion_cueing.train.config import TrainingConfig, load_config, merge
 
-ALGORITHMS = ("ppo", "sac", "td3", "tqc")
+ALGORITHMS = ("ppo", "trpo", "recurrent-ppo", "sac", "td3", "tqc", "crossq")
 
 _COMMON: dict[str, Any] = {
     "n_envs": 4,
@@ -27,12 +27,18 @@ _COMMON: dict[str, Any] = {
 _NET = {"policy_kwargs": {"net_arch": [8, 8]}}
 _GRADIENT = {"net_arch": [8]}
 _ON_POLICY = {"n_steps": 16, "batch_size": 32, **_NET}
+_RECURRENT = merge(_ON_POLICY, {"policy_kwargs": {"lstm_hidden_size": 6}})
 _OFF_POLICY = {"learning_starts": 60, "batch_size": 16, "buffer_size": 240, "gradient_steps": 1, **_NET}
 
 
 def values(algo: str, /, **fields: Any) -> dict[str, Any]:
     """Fields of a tiny configuration."""
-    hyperparameters = {"ppo": _ON_POLICY, "apg": _GRADIENT}.get(algo, _OFF_POLICY)
+    hyperparameters = {
+        "ppo": _ON_POLICY,
+        "trpo": _ON_POLICY,
+        "recurrent-ppo": _RECURRENT,
+        "apg": _GRADIENT,
+    }.get(algo, _OFF_POLICY)
     return merge({**_COMMON, "hyperparameters": hyperparameters}, fields)
 
 

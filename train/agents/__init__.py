@@ -17,12 +17,15 @@ if TYPE_CHECKING:
     from ...envs.platform.machines import Platform
     from .agent import Agent, find_agent, get_agent
     from .files import Record
-    from .network import Network
+    from .network import Network, PolicyNetwork
+    from .recurrent import RecurrentNetwork
 
 _LAZY = {
     "Agent": ".agent",
     "Network": ".network",
+    "PolicyNetwork": ".network",
     "Record": ".files",
+    "RecurrentNetwork": ".recurrent",
     "find_agent": ".agent",
     "get_agent": ".agent",
 }
@@ -30,7 +33,9 @@ _LAZY = {
 __all__ = [
     "Agent",
     "Network",
+    "PolicyNetwork",
     "Record",
+    "RecurrentNetwork",
     "agent_names",
     "describe_policy",
     "find_agent",
@@ -55,10 +60,10 @@ def _from_file(path: Path, platform: "Platform") -> "Agent":
 
 
 def _from_zip(path: Path, platform: "Platform") -> "Agent":
-    make = "Agent(name, task, network_of(model), Record(algo='ppo', seed=0)).save('NAME.safetensors')"
+    command = f"motion-cueing convert {path} --environment ID --out NAME.safetensors"
     raise DataError(
-        f"{path}: a model of Stable-Baselines3 does not say which environment it acts in; save it as an "
-        f"agent, by `{make}` with motion_cueing.train.algorithms.sb3.policy.network_of"
+        f"{path}: a model of Stable-Baselines3 does not say which environment it acts in; `{command}` makes "
+        "an agent of it; loading a model executes code in it, so convert only one that you trust"
     )
 
 

@@ -30,7 +30,7 @@ from ...envs.task.options import TaskOptions
 from . import names
 from .files import Arrays, Contents, Record, arrays_below, contents_of, network_of, read, write
 from .names import SUFFIX, description_of
-from .network import Array, Network
+from .network import Array, PolicyNetwork
 
 DEFAULT: Final = "classical"
 """The washout where one is needed and none is named."""
@@ -58,7 +58,7 @@ def base_of(base: Any, task: TaskOptions) -> Any:
         return None
     given = base or task.action.base or DEFAULT
     if isinstance(given, str | Path):
-        made: Any = make_policy(given, platform_of(task))
+        made = make_policy(given, platform_of(task))
         given = made if made.task is not None else made.parameters
     if not isinstance(given, _parameter_sets()) and as_policy(given).task is None:
         raise ConfigurationError(
@@ -110,7 +110,7 @@ class Agent(TaskPolicy):
 
     name: str = field()
     task: TaskOptions = field()
-    network: Network = field()
+    network: PolicyNetwork = field()
     record: Record = field()
     base: Any = None
 
@@ -173,15 +173,17 @@ class Agent(TaskPolicy):
     ) -> tuple[Array, Any]:
         """Actions within the bound, (n, k) or (k,), for observations (n, size) or (size,) of its environment.
 
+        The state of a network with a memory is an array with a row an environment.
+
         Raises:
-            DataError: the observation has the wrong shape, or is not finite.
+            DataError: the observation has the wrong shape, or is not finite; or the state is of others.
         """
         values = np.asarray(observation, dtype=np.float32)
         if values.ndim not in (1, 2) or values.shape[-1] != self.network.size:
             raise DataError(f"observation has shape {values.shape}, expected (n, {self.network.size})")
         if not np.isfinite(values).all():
             raise DataError("observation is not finite")
-        return self.network(values), state
+        return self.network.step(values, state, episode_start)
 
     def on(self, platform: Platform | str) -> Agent:
         """The same agent on another machine than it was trained on.

@@ -69,20 +69,27 @@ def export_onnx(agent: Agent, path: str | Path) -> Exported:
     the bound. Rows, units, and what an action of 1 stands for are in the file's metadata.
 
     Raises:
-        ExportError: a package is missing, or the exported network computes something else.
+        ExportError: a package is missing, the network has a memory, or the exported one computes something
+            else.
     """
+    network = agent.network.head
+    if agent.network.lstm:
+        raise ExportError(
+            f"agent {agent.name}: its network has a memory (LSTM), which the ONNX file does not hold; "
+            "export an agent without one"
+        )
     torch, onnx, runtime = (_load(name) for name in ("torch", "onnx", "onnxruntime"))
     from ..networks import TorchNetwork
 
-    module = TorchNetwork(agent.network)
-    model = _described(onnx.load_from_string(_exported(torch, module, agent.network.size)), onnx, agent)
+    module = TorchNetwork(network)
+    model = _described(onnx.load_from_string(_exported(torch, module, network.size)), onnx, agent)
     session = _session(runtime, model)
     observations = _observations(agent)
     answers = session.run([OUTPUT], {INPUT: observations})[0]
     with torch.no_grad():
         expected = module(torch.from_numpy(observations)).numpy()
     by_torch = float(np.abs(answers - expected).max())
-    by_numpy = float(np.abs(answers - agent.network(observations)).max())
+    by_numpy = float(np.abs(answers - network(observations)).max())
     if not max(by_torch, by_numpy) <= TOLERANCE:
         raise ExportError(
             f"the exported network differs by {by_torch:.2g} from PyTorch and {by_numpy:.2g} from NumPy, "

@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import field
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,7 +27,8 @@ from ...envs.storage import write_bytes
 from ...envs.task.episode import platform_of
 from ...envs.task.options import TaskOptions
 from .names import LENGTH, METADATA
-from .network import Activation, Network, Squash
+from .network import Activation, LstmLayer, Network, PolicyNetwork, Squash
+from .recurrent import RecurrentNetwork
 
 
 @configuration
@@ -83,6 +85,7 @@ class Contents:
         base: Parameters of the washout or the predictive controller under the agent.
         bound: Of its actions.
         agent: The agent under the agent.
+        memory: LSTM layers of the network, before those that ``layers`` counts.
     """
 
     name: str
@@ -97,40 +100,45 @@ class Contents:
     base: MpcParameters | AnyWashout | None = None
     bound: Positive = 1.0
     agent: Contents | None = None
+    memory: int = 0
 
 
 def contents_of(
     name: str,
     task: TaskOptions,
-    network: Network,
+    network: PolicyNetwork,
     record: Record,
     base: MpcParameters | FamilyParameters | tuple[Arrays, Contents] | None,
 ) -> tuple[Arrays, Contents]:
     """Arrays by name, and contents, of an agent; ``base`` is a parameter set, or the same of an agent."""
+    head = network.head
     below, inner = base if isinstance(base, tuple) else ({}, None)
     contents = Contents(
         name=name,
         task=task,
         platform=platform_of(task),
         record=record,
-        activation=network.activation,
-        squash=network.squash,
-        skip=network.skip,
+        activation=head.activation,
+        squash=head.squash,
+        skip=head.skip,
         clip=network.clip,
-        layers=len(network.weights),
+        layers=len(head.weights),
         base=None if isinstance(base, tuple) else base,
         bound=network.bound,
         agent=inner,
+        memory=len(network.lstm),
     )
     arrays: Arrays = {f"{_BASE}{key}": array for key, array in below.items()}
-    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+    for k, (weight, bias) in enumerate(zip(head.weights, head.biases, strict=True)):
         arrays[_weight(k)], arrays[_bias(k)] = weight, bias
+    for k, layer in enumerate(network.lstm):
+        arrays |= zip(_lstm(k), layer, strict=True)
     if network.mean is not None and network.variance is not None:
         arrays[_MEAN], arrays[_VARIANCE] = network.mean, network.variance
     return arrays, contents
 
 
-def network_of(arrays: Mapping[str, NDArray[Any]], contents: Contents, source: str) -> Network:
+def network_of(arrays: Mapping[str, NDArray[Any]], contents: Contents, source: str) -> PolicyNetwork:
     """The network of an agent.
 
     Args:
@@ -143,23 +151,27 @@ def network_of(arrays: Mapping[str, NDArray[Any]], contents: Contents, source: s
         ConfigurationError: the machine is another one now.
     """
     _check_platform(contents, source)
-    layers = range(contents.layers)
+    layers, memory = range(contents.layers), [_lstm(k) for k in range(contents.memory)]
     expected = {_weight(k) for k in layers} | {_bias(k) for k in layers}
+    expected |= {name for names in memory for name in names}
     normalized = {_MEAN, _VARIANCE} & arrays.keys()
     if arrays.keys() - normalized != expected:
         wrong = ", ".join(sorted((arrays.keys() - normalized) ^ expected))
         raise DataError(f"{source}: arrays missing or unknown: {wrong}")
-    return Network(
+    mean, variance = arrays.get(_MEAN), arrays.get(_VARIANCE)
+    head = partial(
+        Network,
         weights=tuple(arrays[_weight(k)] for k in layers),
         biases=tuple(arrays[_bias(k)] for k in layers),
         activation=contents.activation,
         squash=contents.squash,
         skip=contents.skip,
-        mean=arrays.get(_MEAN),
-        variance=arrays.get(_VARIANCE),
-        clip=contents.clip,
         bound=contents.bound,
     )
+    if not memory:
+        return head(mean=mean, variance=variance, clip=contents.clip)
+    lstm = tuple(LstmLayer(*(arrays[name] for name in names)) for names in memory)
+    return RecurrentNetwork(lstm, head(), mean, variance, contents.clip)
 
 
 def arrays_below(arrays: Mapping[str, NDArray[Any]]) -> tuple[Arrays, Arrays]:
@@ -186,6 +198,10 @@ def _weight(k: int) -> str:
 
 def _bias(k: int) -> str:
     return f"layers.{k}.bias"
+
+
+def _lstm(k: int) -> list[str]:
+    return [f"lstm.{k}.{name}" for name in LstmLayer._fields]
 
 
 # An agent's file: safetensors with one entry of metadata, JSON with version and checksum.

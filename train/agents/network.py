@@ -1,11 +1,14 @@
-"""Multilayer perceptron of an agent: its layers, and inference in NumPy.
+"""Networks of agents: their layers, and inference in NumPy.
 
-:class:`Network` is the one declaration of a policy's layers, activations and normalization. NumPy alone runs
-it. ``train/networks.py`` builds the PyTorch forms from it: one to train, one to export.
+:class:`Network`, a multilayer perceptron, is the one declaration of a policy's layers, activations and
+normalization. ``train/networks.py`` builds the PyTorch forms from it: one to train, one to export.
+:class:`~.recurrent.RecurrentNetwork` has LSTM layers before one. NumPy alone runs both, by one interface,
+:class:`PolicyNetwork`.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -60,8 +63,126 @@ ACTIVATIONS: Final[Mapping[str, ActivationFunctions]] = {
 """Activations by name."""
 
 
+class LstmLayer(NamedTuple):
+    """Weights of one LSTM layer, float32; rows of input gate, forget gate, candidate and output gate.
+
+    Args:
+        inputs: (4 units, inputs) on the layer's input.
+        recurrent: (4 units, units) on its output of the step before.
+        bias: (4 units,) of both.
+    """
+
+    inputs: Array
+    recurrent: Array
+    bias: Array
+
+    @property
+    def units(self) -> int:
+        """Entries of its output."""
+        return int(self.recurrent.shape[1])
+
+
+class PolicyNetwork(ABC):
+    """A policy from observations to actions within +-``bound``, with a memory or without one.
+
+    The observation is normalized, (x - mean) / sqrt(variance + EPSILON), and clipped to +-``clip``.
+
+    Attributes:
+        mean: (size,) mean of the observation, float64; None leaves it as it is.
+        variance: (size,) its variance; given with ``mean``.
+        clip: Largest absolute value of a normalized observation.
+        bound: Largest absolute value of an action.
+        lstm: Layers with a memory; none for a multilayer perceptron.
+        head: The multilayer perceptron: all of it, or what follows the layers with a memory.
+    """
+
+    mean: NDArray[np.float64] | None
+    variance: NDArray[np.float64] | None
+    clip: float
+    bound: float
+    lstm: tuple[LstmLayer, ...]
+    head: Network
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Entries of an observation."""
+
+    @property
+    @abstractmethod
+    def action_size(self) -> int:
+        """Entries of an action."""
+
+    @abstractmethod
+    def step(self, observation: ArrayLike, state: Any = None, begins: Any = None) -> tuple[Array, Any]:
+        """Actions for observations, unchecked, and the memory after them.
+
+        Args:
+            observation: (n, size) or (size,).
+            state: What the last call returned, a row an environment; None where all begin.
+            begins: (n,) whether an episode begins, before which nothing is remembered; None for nowhere.
+
+        Returns:
+            (n, action_size) or (action_size,), and the next state.
+
+        Raises:
+            DataError: the state is not one of these environments.
+        """
+
+    def acting(self) -> Callable[[ArrayLike], Array]:
+        """The policy from the beginning of episodes to their end, with a memory of its own."""
+        state: Any = None
+
+        def act(observation: ArrayLike) -> Array:
+            nonlocal state
+            action, state = self.step(observation, state)
+            return action
+
+        return act
+
+    def _take(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _take_normalization(self) -> None:
+        """Check mean, variance and clip, and take read-only copies."""
+        if (self.mean is None) != (self.variance is None):
+            raise DataError("network: give mean and variance together, or neither")
+        for name in ("mean", "variance"):
+            if getattr(self, name) is not None:
+                self._take(name, array_of(name, getattr(self, name), 1, np.float64))
+                shape = getattr(self, name).shape
+                if shape != (self.size,):
+                    raise DataError(f"network: {name} has shape {shape}, expected {(self.size,)}")
+        if self.variance is not None and self.variance.min() < 0.0:
+            raise DataError(f"network: variance must not be negative, found {self.variance.min()}")
+        check_positive("clip", self.clip)
+
+    @cached_property
+    def normalization(self) -> tuple[Array, Array, Array]:
+        """(size,) mean, what float32 loses of the mean, and factor.
+
+        Taking the mean off in two parts is as exact as float64: a nearly constant entry has a large factor.
+        """
+        mean = np.zeros(self.size) if self.mean is None else self.mean
+        variance = np.ones(self.size) - EPSILON if self.variance is None else self.variance
+        high = mean.astype(np.float32)
+        return high, (mean - high).astype(np.float32), (1.0 / np.sqrt(variance + EPSILON)).astype(np.float32)
+
+    @cached_property
+    def _bounds(self) -> tuple[Array, Array]:
+        return np.array(-self.clip, dtype=np.float32), np.array(self.clip, dtype=np.float32)
+
+    def _normalized(self, x: Array) -> Array:
+        if self.mean is None:
+            return x
+        high, low, factor = self.normalization
+        lowest, highest = self._bounds
+        normalized: Array = np.minimum(np.maximum((x - high - low) * factor, lowest), highest)
+        return normalized
+
+
 @dataclass(frozen=True, eq=False)
-class Network:
+class Network(PolicyNetwork):
     """Multilayer perceptron from observations to actions within +-``bound``.
 
     The observation is normalized, (x - mean) / sqrt(variance + EPSILON), and clipped to +-``clip``. Hidden
@@ -99,18 +220,9 @@ class Network:
         _check_choice("squash", self.squash, get_args(Squash))
         self._take("weights", _arrays("weights", self.weights, 2))
         self._take("biases", _arrays("biases", self.biases, 1))
-        if (self.mean is None) != (self.variance is None):
-            raise DataError("network: give mean and variance together, or neither")
-        for name in ("mean", "variance"):
-            if getattr(self, name) is not None:
-                self._take(name, _array(name, getattr(self, name), 1, np.float64))
-        for name in ("clip", "bound"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise DataError(f"network: {name} must be positive, found {getattr(self, name)}")
+        check_positive("bound", self.bound)
         self._check_shapes()
-
-    def _take(self, name: str, value: Any) -> None:
-        object.__setattr__(self, name, value)
+        self._take_normalization()
 
     def _check_shapes(self) -> None:
         if not self.weights or len(self.weights) != len(self.biases):
@@ -127,12 +239,6 @@ class Network:
             inputs = weight.shape[0]
             if bias.shape != (inputs,):
                 raise DataError(f"network: biases {k} have shape {bias.shape}, expected {(inputs,)}")
-        for name in ("mean", "variance"):
-            values = getattr(self, name)
-            if values is not None and values.shape != (self.size,):
-                raise DataError(f"network: {name} has shape {values.shape}, expected {(self.size,)}")
-        if self.variance is not None and self.variance.min() < 0.0:
-            raise DataError(f"network: variance must not be negative, found {self.variance.min()}")
 
     @property
     def size(self) -> int:
@@ -144,24 +250,19 @@ class Network:
         """Entries of an action."""
         return int(self.weights[-1].shape[0])
 
-    @cached_property
-    def normalization(self) -> tuple[Array, Array, Array]:
-        """(size,) mean, what float32 loses of the mean, and factor.
+    @property
+    def head(self) -> Network:  # type: ignore[override]
+        """The network itself."""
+        return self
 
-        Taking the mean off in two parts is as exact as float64: a nearly constant entry has a large factor.
-        """
-        mean = np.zeros(self.size) if self.mean is None else self.mean
-        variance = np.ones(self.size) - EPSILON if self.variance is None else self.variance
-        high = mean.astype(np.float32)
-        return high, (mean - high).astype(np.float32), (1.0 / np.sqrt(variance + EPSILON)).astype(np.float32)
+    @property
+    def lstm(self) -> tuple[LstmLayer, ...]:  # type: ignore[override]
+        """No layers with a memory."""
+        return ()
 
     @cached_property
     def _largest(self) -> Array:
         return np.array(self.bound, dtype=np.float32)
-
-    @cached_property
-    def _bounds(self) -> tuple[Array, Array]:
-        return np.array(-self.clip, dtype=np.float32), np.array(self.clip, dtype=np.float32)
 
     def __call__(self, observation: ArrayLike) -> Array:
         """Actions (n, action_size) or (action_size,) for observations (n, size) or (size,), unchecked."""
@@ -170,6 +271,10 @@ class Network:
             # A vector is quicker than a matrix of one row.
             return self._forward(x[0])[None]
         return self._forward(x)
+
+    def step(self, observation: ArrayLike, state: Any = None, begins: Any = None) -> tuple[Array, Any]:
+        """The same actions, and the state as it came: there is no memory."""
+        return self(observation), state
 
     def _forward(self, x: Array) -> Array:
         x = hidden = self._normalized(x)
@@ -185,13 +290,11 @@ class Network:
             return squashed
         return np.asarray(np.minimum(np.maximum(out, -largest), largest))
 
-    def _normalized(self, x: Array) -> Array:
-        if self.mean is None:
-            return x
-        high, low, factor = self.normalization
-        lowest, highest = self._bounds
-        normalized: Array = np.minimum(np.maximum((x - high - low) * factor, lowest), highest)
-        return normalized
+
+def check_positive(name: str, value: float) -> None:
+    """Refuse what is not a positive number."""
+    if not (np.isfinite(value) and value > 0.0):
+        raise DataError(f"network: {name} must be positive, found {value}")
 
 
 def _check_choice(name: str, value: Any, known: Sequence[str]) -> None:
@@ -200,10 +303,10 @@ def _check_choice(name: str, value: Any, known: Sequence[str]) -> None:
 
 
 def _arrays(name: str, values: Sequence[ArrayLike], rank: int) -> tuple[NDArray[Any], ...]:
-    return tuple(_array(f"{name} {k}", value, rank, np.float32) for k, value in enumerate(values))
+    return tuple(array_of(f"{name} {k}", value, rank, np.float32) for k, value in enumerate(values))
 
 
-def _array(name: str, value: ArrayLike, rank: int, kind: type[np.floating[Any]]) -> NDArray[Any]:
+def array_of(name: str, value: ArrayLike, rank: int, kind: type[np.floating[Any]]) -> NDArray[Any]:
     """A read-only copy of its own."""
     try:
         array = np.array(value, dtype=kind, order="C")

@@ -283,7 +283,7 @@ np.testing.assert_allclose(observation[where["last_action"]], 0.1, rtol=1e-6)
 error = state["reference_cue"]["rate"] - state["simulator_cue"]["rate"]
 np.testing.assert_allclose(observation[where["rate_error"]], error, rtol=1e-5, atol=1e-7)
 assert list(where).index("height") == list(where).index("rate_error") - 1
-assert "| `height` | 1 | m | 2 | 10 | how deep the cab hangs |" in observation_table()
+assert "| `height` | 1 | m | 2 | 2 | 10 | how deep the cab hangs |" in observation_table()
 """
 
 

@@ -10,7 +10,8 @@ from motion_cueing.baselines.registry import POLICIES
 from motion_cueing.baselines.washout.classical.policies import KNOBS
 from motion_cueing.envs.task import TaskOptions
 from motion_cueing.envs.task.kernels.observation import layout_of
-from motion_cueing.train.agents import Agent, Network, Record, names, register_agents
+from motion_cueing.train.agents import Agent, Network, Record, RecurrentNetwork, names, register_agents
+from motion_cueing.train.agents.network import LstmLayer
 
 RECORD = Record(
     algo="ppo", seed=3, command="motion-cueing train --algo ppo", steps=1000, versions={"numpy": "2.0"}
@@ -29,6 +30,19 @@ def network(sizes, seed: int = 0, normalized: bool = True, **choices: Any) -> Ne
         weights=tuple(rng.normal(size=shape) / np.sqrt(shape[1]) for shape in shapes),
         biases=tuple(0.1 * rng.normal(size=shape[0]) for shape in shapes),
         **{**statistics, **choices},
+    )
+
+
+def recurrent(size: int, units=(6, 5), outputs: int = 9, seed: int = 0, **choices: Any) -> RecurrentNetwork:
+    """A network with LSTM layers of these units."""
+    rng, layers, inputs = np.random.default_rng(seed), [], size
+    for n in units:
+        shapes = (4 * n, inputs), (4 * n, n), (4 * n,)
+        layers.append(LstmLayer(*(rng.normal(size=shape) / np.sqrt(n) for shape in shapes)))
+        inputs = n
+    statistics = {"mean": rng.normal(size=size), "variance": rng.uniform(0.01, 4.0, size)}
+    return RecurrentNetwork(
+        tuple(layers), network((inputs, 4, outputs), normalized=False), **statistics, **choices
     )
 
 

@@ -1,4 +1,4 @@
-"""Algorithms of Stable-Baselines3: PPO, SAC, TD3, and TQC of sb3-contrib.
+"""Algorithms of Stable-Baselines3 and sb3-contrib: those of :data:`~.policy.CLASSES`.
 
 Hyperparameters are those of the class, as rl-baselines3-zoo writes them in YAML, checked against its
 signature.
@@ -14,8 +14,8 @@ from typing import Any, Final, get_type_hints
 import numpy as np
 import torch
 from pydantic import ConfigDict, TypeAdapter, ValidationError
-from sb3_contrib import TQC
-from stable_baselines3 import PPO, SAC, TD3
+from sb3_contrib import TRPO, RecurrentPPO
+from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
@@ -23,7 +23,7 @@ from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckA
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ....envs.errors import ConfigurationError, suggest
-from ...agents import Network
+from ...agents import PolicyNetwork
 from ...agents.agent import base_policy
 from ...config import TrainingConfig
 from ...logs import Monitor
@@ -31,7 +31,7 @@ from ...networks import TORCH_ACTIVATIONS
 from ...registry import Boundary, Learner, State
 from ...training import initial_network
 from ...vec_env import DrivingSimulatorVecEnv
-from .policy import SkipPolicy, load_network, network_of
+from .policy import CLASSES, SkipPolicy, load_network, network_of
 from .state import restore, restore_random, state_of
 
 SCHEDULED: Final = "lin_"
@@ -45,7 +45,7 @@ NOISES: Final[Mapping[str, Any]] = {
 
 _NOISE: Final = ("noise_type", "noise_std")
 _POLICY: Final = "policy"
-_OURS: Final = {
+OURS: Final = {
     "self", "policy", "env", "verbose", "seed", "device", "tensorboard_log", "stats_window_size",
     "action_noise", "rollout_buffer_class", "rollout_buffer_kwargs", "replay_buffer_class",
     "replay_buffer_kwargs", "optimize_memory_usage", "_init_setup_model",
@@ -53,7 +53,7 @@ _OURS: Final = {
 """Arguments that the training sets, or that a file cannot hold."""
 _OURS_OF_POLICY: Final = {"self", "observation_space", "action_space", "lr_schedule", "use_sde"} | {
     "features_extractor_class", "features_extractor_kwargs", "share_features_extractor", "normalize_images",
-    "optimizer_class", "optimizer_kwargs", "squash_output",
+    "optimizer_class", "optimizer_kwargs", "squash_output", "lstm_kwargs",
 }  # fmt: skip
 
 _LENIENT: Final = ConfigDict(arbitrary_types_allowed=True)
@@ -68,29 +68,35 @@ def arguments(
         algorithm: Its class.
         hyperparameters: As in rl-baselines3-zoo: numbers may be schedules (``lin_3e-4``); ``policy_kwargs``
             is a mapping, its ``activation_fn`` one of :data:`TORCH_ACTIVATIONS`. ``policy`` is "MlpPolicy"
-            or, for PPO, "SkipPolicy", with a skip connection. ``noise_type`` and ``noise_std`` make the
-            action noise.
+            ("MlpLstmPolicy" for RecurrentPPO) or, for PPO and TRPO, "SkipPolicy", with a skip connection.
+            ``noise_type`` and ``noise_std`` make the action noise.
         action_size: Entries of an action.
 
     Raises:
         ConfigurationError: one is unknown or of the wrong type.
     """
-    known = _parameters(algorithm, _OURS)
+    known = parameters(algorithm, OURS)
     noisy = "action_noise" in inspect.signature(algorithm).parameters
     _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *(_NOISE if noisy else ())])
     given = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
     given["policy_kwargs"] = _policy_kwargs(algorithm, given.get("policy_kwargs") or {})
     checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in given.items()}
     checked[_POLICY] = _policy(
-        algorithm, hyperparameters.get(_POLICY, "MlpPolicy"), bool(hyperparameters.get("use_sde"))
+        algorithm, hyperparameters.get(_POLICY, _plain(algorithm)), bool(hyperparameters.get("use_sde"))
     )
     if "noise_type" in hyperparameters or "noise_std" in hyperparameters:
         checked["action_noise"] = _noise(hyperparameters, action_size)
     return checked
 
 
+def _plain(algorithm: type[BaseAlgorithm]) -> str:
+    """The policy without pictures."""
+    return "MlpLstmPolicy" if algorithm is RecurrentPPO else "MlpPolicy"
+
+
 def _policy(algorithm: type[BaseAlgorithm], name: Any, use_sde: bool) -> Any:
-    known = {"MlpPolicy": "MlpPolicy"} | ({"SkipPolicy": SkipPolicy} if algorithm is PPO else {})
+    plain = _plain(algorithm)
+    known = {plain: plain} | ({"SkipPolicy": SkipPolicy} if algorithm in (PPO, TRPO) else {})
     if name not in known:
         raise ConfigurationError(f"hyperparameters.policy: {name!r}; use one of {', '.join(known)}")
     if known[name] is SkipPolicy and use_sde:
@@ -98,7 +104,7 @@ def _policy(algorithm: type[BaseAlgorithm], name: Any, use_sde: bool) -> Any:
     return known[name]
 
 
-def _parameters(cls: type[Any], ours: set[str]) -> dict[str, Any]:
+def parameters(cls: type[Any], ours: set[str]) -> dict[str, Any]:
     """What a class can be given in a file, with its types."""
     constructor: Any = cls.__init__
     annotations = {
@@ -119,7 +125,7 @@ def _policy_kwargs(algorithm: type[BaseAlgorithm], given: Any) -> dict[str, Any]
     where = "hyperparameters.policy_kwargs"
     if not isinstance(given, Mapping):
         raise ConfigurationError(f"{where}: expected fields with values, found {given!r}")
-    known = _parameters(algorithm.policy_aliases["MlpPolicy"], _OURS_OF_POLICY)
+    known = parameters(algorithm.policy_aliases[_plain(algorithm)], _OURS_OF_POLICY)
     _refuse_unknown(where, given, list(known))
     checked = dict(given)
     if "activation_fn" in checked:
@@ -166,7 +172,6 @@ def _noise(given: Mapping[str, Any], size: int) -> Any:
 _NUMBER: Final = (int, float, np.number)
 _INITIAL_WEIGHT: Final = 1e5
 """Observations that the normalization of an initial agent counts for."""
-CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 
 
 class SB3Learner(Learner):
@@ -233,7 +238,7 @@ class SB3Learner(Learner):
         values: dict[str, Any] = self.model.logger.name_to_value
         return {name: float(value) for name, value in values.items() if isinstance(value, _NUMBER)}
 
-    def network(self) -> Network:
+    def network(self) -> PolicyNetwork:
         """The deterministic policy with its normalization."""
         return network_of(self.model, self.normalize)
 

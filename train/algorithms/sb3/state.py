@@ -11,6 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 import torch
+from sb3_contrib import RecurrentPPO
+from sb3_contrib.common.recurrent.type_aliases import RNNStates
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise, VectorizedActionNoise
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
@@ -34,6 +36,7 @@ def state_of(
         "tensors": {name: attrgetter(name)(model).detach() for name in tensors},
         "plain": {name: getattr(model, name) for name in _PLAIN},
         "arrays": {name: getattr(model, name, None) for name in _ARRAYS},
+        "lstm": _lstm(model),
         "episodes": [dict(info) for info in model.ep_info_buffer or ()],
         "replay": _replay(model),
         "normalize": None if normalize is None else _statistics(normalize),
@@ -68,8 +71,17 @@ def _restore_model(state: State, model: BaseAlgorithm) -> None:
     for name in (*_PLAIN, *_ARRAYS):
         group = "plain" if name in _PLAIN else "arrays"
         setattr(model, name, state[group][name])
+    if isinstance(model, RecurrentPPO):
+        recurrent: Any = model
+        recurrent._last_lstm_states = RNNStates(*(tuple(pair) for pair in state["lstm"]))
     model.ep_info_buffer = deque(state["episodes"], maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
+
+
+def _lstm(model: BaseAlgorithm) -> list[list[torch.Tensor]] | None:
+    """Output and cell of the actor's LSTM, and of the critic's."""
+    states: Any = model._last_lstm_states if isinstance(model, RecurrentPPO) else None
+    return None if states is None else [list(states.pi), list(states.vf)]
 
 
 def _replay(model: BaseAlgorithm) -> dict[str, Any] | None:

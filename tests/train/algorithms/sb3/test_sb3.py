@@ -12,7 +12,8 @@ from stable_baselines3.common.type_aliases import TrainFreq
 from torch import nn
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.train.algorithms.sb3.sb3 import CLASSES, arguments
+from motion_cueing.train.algorithms.sb3.policy import CLASSES
+from motion_cueing.train.algorithms.sb3.sb3 import arguments
 from motion_cueing.train.config import load_config
 
 
