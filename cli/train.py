@@ -114,7 +114,18 @@ def _train(command: TrainCommand) -> int:
     folder = _folder(command)
     with TrainingProgress(folder.config.steps) as progress:
         outcome = Training(folder, progress.tell).train()
-    return report_training(folder, outcome)
+    status = report_training(folder, outcome)
+    if not outcome.interrupted:
+        _draw_curves([folder.path])
+    return status
+
+
+def _draw_curves(folders: list[Path]) -> None:
+    """Draw what was learned in each folder where a training ended, and say where."""
+    from .curves import draw_learning
+
+    for folder in folders:
+        print(f"{draw_learning(folder)}: J over the actions")
 
 
 def _folder(command: TrainCommand) -> RunFolder:
