@@ -40,8 +40,8 @@ def test_an_agent_comes_of_it(algo, tmp_path, capsys):
     assert "final.safetensors: the agent after" in told.out
     assert "(washout " in told.err
     # Its gamma is of a few seconds: said once, before it trains.
-    assert told.err.splitlines()[0].startswith("warning: hyperparameters gamma")
-    assert told.err.count("s ahead, but the travel of an action of 1") == 1
+    assert told.err.splitlines()[0].startswith("warning: hyperparameters: gamma")
+    assert told.err.count("s, but its travel costs after") == 1
     assert f"{out / 'learning.png'}: J over the actions" in told.out
 
     config = load(TrainingConfig, out / "config.yaml")

@@ -155,7 +155,7 @@ def test_a_person_sees_references_noise_and_warnings_once_and_no_more_when_it_go
     # A trace of 0.2 s: said before anything is measured.
     steps, news, (sentence,), references = seen[0]
     assert (steps, news, references) == (0, False, None)
-    assert "s ahead, but the travel of an action of 1 costs after" in sentence
+    assert "s, but its travel costs after" in sentence
     assert not any(sentence in warnings for _, _, warnings, _ in seen[1:])
     validation = Validation(config)
     washout = validation.score_policy(ClassicalWashout("classical", platform_of(config.task).cab))

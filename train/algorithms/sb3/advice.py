@@ -65,10 +65,10 @@ def _short_horizon(config: TrainingConfig, algorithm: type[BaseAlgorithm]) -> st
     if time is None or horizon >= time:
         return None
     on_policy = issubclass(algorithm, OnPolicyAlgorithm)
-    fields = "gamma and gae_lambda" if on_policy else "gamma"
+    fields, verb = ("gamma and gae_lambda", "credit") if on_policy else ("gamma", "credits")
     return (
-        f"hyperparameters {fields} look {horizon:.1f} s ahead, but the travel of an action of 1 costs after "
-        f"{time:.1f} s: raise {fields}, or charge travel earlier (task.reward.stroke_margin, stroke_braking)"
+        f"hyperparameters: {fields} {verb} an action for {horizon:.1f} s, but its travel costs after "
+        f"{time:.1f} s; raise {fields}, or charge travel earlier (task.reward.stroke_margin, stroke_braking)"
     )
 
 

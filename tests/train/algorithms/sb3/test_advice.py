@@ -47,9 +47,9 @@ def test_a_gaussian_wider_than_the_bound_is_told_and_a_hopeless_one_refused():
     ("algo", "hyperparameters", "words"),
     [
         # 0.08 s an action: 1 / (1 - 0.97 * 0.95) = 12.7 of them, and 1 / (1 - 0.9) = 10.
-        ("ppo", {"gamma": 0.97, "gae_lambda": 0.95}, "gamma and gae_lambda look 1.0 s ahead"),
-        ("ppo", {}, "gamma and gae_lambda look 1.3 s ahead"),
-        ("sac", {"gamma": 0.9}, "gamma look 0.8 s ahead"),
+        ("ppo", {"gamma": 0.97, "gae_lambda": 0.95}, "gamma and gae_lambda credit an action for 1.0 s"),
+        ("ppo", {}, "gamma and gae_lambda credit an action for 1.3 s"),
+        ("sac", {"gamma": 0.9}, "gamma credits an action for 0.8 s"),
     ],
 )
 def test_a_horizon_shorter_than_the_travels_time_is_told(algo, hyperparameters, words):
