@@ -26,6 +26,8 @@ _INSIDE: Final = 4
 _MILLION: Final = 1e6
 _J: Final = "validation/J"
 _NOISY: Final = "exploring"
+_LEAST: Final = 1e-9
+"""J below it has no place on a logarithmic axis."""
 _LINE: Final = 0.065
 """Height of a label, as a share of the axes'."""
 
@@ -107,7 +109,7 @@ def learning_figure(folder: Path) -> Any:
     figure = new_figure(6.4, 3.4)
     axes = figure.subplots()
     axes.set_yscale("log")
-    ends = {"agent": (curve, {"color": CAR, "linewidth": 1.8})}
+    ends: dict[str, tuple[Curve, dict[str, Any]]] = {"agent": (curve, {"color": CAR, "linewidth": 1.8})}
     beside = [column for column in _BESIDE if column in known]
     styles = line_styles([_BESIDE[column] for column in beside] + [_NOISY])
     if "validation/noisy_J" in known:
@@ -132,7 +134,7 @@ def _label_ends(axes: Any, ends: Mapping[str, tuple[float, Any]]) -> None:
     """Names beside the right ends of lines, moved apart where they would overlap."""
     low, high = np.log(axes.get_ylim())
     ordered = sorted(ends, key=lambda name: ends[name][0])
-    places = [(math.log(ends[name][0]) - low) / (high - low) for name in ordered]
+    places = [(math.log(max(ends[name][0], _LEAST)) - low) / (high - low) for name in ordered]
     for i in range(1, len(places)):
         places[i] = max(places[i], places[i - 1] + _LINE)
     # What was pushed beyond the top goes back down with all below it.

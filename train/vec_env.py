@@ -178,7 +178,7 @@ class DrivingSimulatorVecEnv(VecEnv):
         mean = grouped.mean(axis=1, keepdims=True)
         self._groups += [len(mean), mean.sum(), np.square(mean).sum(), grouped.var(axis=1, ddof=1).sum()]
         own = grouped - mean
-        return (own * (self.group / (self.group - 1.0))).reshape(-1).astype(np.float32)
+        return np.asarray(own * (self.group / (self.group - 1.0)), dtype=np.float32).reshape(-1)
 
     def take_drive_share(self) -> float | None:
         """Share of the variance of rewards that a group has in common since the last call, and begin anew.
