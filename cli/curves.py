@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,6 +24,12 @@ _INSIDE: Final = 4
 """Groups whose legend has room among the curves."""
 
 _MILLION: Final = 1e6
+_J: Final = "validation/J"
+_NOISY: Final = "exploring"
+_LEAST: Final = 1e-9
+"""J below it has no place on a logarithmic axis."""
+_LINE: Final = 0.065
+"""Height of a label, as a share of the axes'."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +44,7 @@ class CurvesCommand:
     """Folders that `motion-cueing train` made."""
     out: Annotated[Path, option("FILE.png|FILE.svg")]
     """Picture to write."""
-    scalar: str = "validation/J"
+    scalar: str = _J
     """Column of log.csv."""
 
 
@@ -59,6 +66,85 @@ def run(command: CurvesCommand) -> int:
         print(f"{name}: lowest {command.scalar} {best.mean():.3g} ({best.min():.3g} to {best.max():.3g})")
     print(f"{command.out}: {len(curves)} trainings")
     return 0
+
+
+LEARNING: Final = "learning.png"
+"""Picture of what was learned, in the folder of a training."""
+
+_BESIDE: Final = {
+    "classical/J": "classical washout",
+    "no-motion/J": "standing still",
+    "start/J": "at the start",
+}
+"""What a training is compared with, by column."""
+
+
+def draw_learning(folder: Path) -> Path:
+    """Draw J over the actions of a training beside its references, into its folder.
+
+    Returns:
+        The picture's file.
+
+    Raises:
+        DataError: the folder has no log of a training with a validation.
+    """
+    from ..evaluation.reporting.figures import styled
+
+    with styled():
+        figure = learning_figure(folder)
+        with replacing(folder / LEARNING, "wb") as file:
+            figure.savefig(file, format="png")
+    return folder / LEARNING
+
+
+def learning_figure(folder: Path) -> Any:
+    """J over the actions, with and without the noise of exploration, and lines for the references."""
+    from matplotlib.ticker import FuncFormatter
+
+    from ..evaluation.reporting.figures import CAR, line_styles, new_figure
+    from ..train.logs import read_log
+
+    curve = read_curve(folder, _J)
+    known = {name for row in read_log(folder) for name in row}
+    figure = new_figure(6.4, 3.4)
+    axes = figure.subplots()
+    axes.set_yscale("log")
+    ends: dict[str, tuple[Curve, dict[str, Any]]] = {"agent": (curve, {"color": CAR, "linewidth": 1.8})}
+    beside = [column for column in _BESIDE if column in known]
+    styles = line_styles([_BESIDE[column] for column in beside] + [_NOISY])
+    if "validation/noisy_J" in known:
+        ends[_NOISY] = (read_curve(folder, "validation/noisy_J"), {**styles[_NOISY], "linewidth": 0.9})
+    for column in beside:
+        level = read_curve(folder, column)[1, 0]
+        level_line = np.array([curve[0, [0, -1]], [level, level]])
+        ends[_BESIDE[column]] = (level_line, {**styles[_BESIDE[column]], "linewidth": 0.9})
+    for (steps, values), style in ends.values():
+        axes.plot(steps / _MILLION, values, **style)
+    axes.margins(x=0.0)
+    _label_ends(axes, {name: (line[1, -1], style["color"]) for name, (line, style) in ends.items()})
+    axes.set_xlabel("actions, million")
+    axes.set_ylabel("J on the validation drives")
+    for axis_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        axis_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_title(folder.resolve().name, pad=10.0)
+    return figure
+
+
+def _label_ends(axes: Any, ends: Mapping[str, tuple[float, Any]]) -> None:
+    """Names beside the right ends of lines, moved apart where they would overlap."""
+    low, high = np.log(axes.get_ylim())
+    ordered = sorted(ends, key=lambda name: ends[name][0])
+    places = [(math.log(max(ends[name][0], _LEAST)) - low) / (high - low) for name in ordered]
+    for i in range(1, len(places)):
+        places[i] = max(places[i], places[i - 1] + _LINE)
+    # What was pushed beyond the top goes back down with all below it.
+    places[-1] = min(places[-1], 1.0)
+    for i in range(len(places) - 2, -1, -1):
+        places[i] = min(places[i], places[i + 1] - _LINE)
+    for name, place in zip(ordered, places, strict=True):
+        value, color = ends[name]
+        text = f"{name} {value:.3g}"
+        axes.annotate(text, (1.01, place), xycoords="axes fraction", va="center", color=color)
 
 
 def read_curve(folder: Path, scalar: str) -> Curve:

@@ -98,10 +98,12 @@ def run(command: TrainCommand) -> int:
 
     check(command)
     if command.seeds or (command.out is not None and studies.is_seeds(command.out)):
-        return studies.run_seeds(_seeds(command), place(command))
+        seeds = _seeds(command)
+        status = studies.run_seeds(seeds, place(command))
+        return _with_curves(status, [job.path for job in seeds.jobs])
     if command.engine == "ray":
-        where = place(command)
-        return studies.run_training(_folder(command), where)
+        where, folder = place(command), _folder(command)
+        return _with_curves(studies.run_training(folder, where), [folder.path])
     if command.workers is not None:
         raise ConfigurationError("--workers is of use only where there are several trainings; leave it out")
     return _train(command)
@@ -114,7 +116,17 @@ def _train(command: TrainCommand) -> int:
     folder = _folder(command)
     with TrainingProgress(folder.config.steps) as progress:
         outcome = Training(folder, progress.tell).train()
-    return report_training(folder, outcome)
+    return _with_curves(report_training(folder, outcome), [folder.path])
+
+
+def _with_curves(status: int, folders: list[Path]) -> int:
+    """Draw what was learned in each folder, and say where, unless the trainings were stopped."""
+    from .curves import draw_learning
+
+    if status == 0:
+        for folder in folders:
+            print(f"{draw_learning(folder)}: J over the actions")
+    return status
 
 
 def _folder(command: TrainCommand) -> RunFolder:

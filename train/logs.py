@@ -88,6 +88,10 @@ class TrainingLog:
         self.rows = [row for row in read_log(folder) if row[STEPS] <= steps]
         self._events: Any = SummaryWriter(str(folder / _EVENTS), purge_step=steps + 1)
 
+    def last(self, name: str) -> float | None:
+        """The latest value of a scalar; None where there is none yet."""
+        return next((row[name] for row in reversed(self.rows) if name in row), None)
+
     def write(self, steps: int, scalars: Mapping[str, float]) -> None:
         """Add a row; scalars of the same steps join the row there is."""
         if not scalars:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
@@ -21,6 +21,7 @@ from ..envs.registry import Registry
 if TYPE_CHECKING:
     from .agents import PolicyNetwork
     from .config import TrainingConfig
+    from .validation import Act
 
 Boundary = Callable[[], None]
 """Called between updates; may raise :class:`StopTraining`."""
@@ -84,6 +85,25 @@ class Learner(ABC):
     @abstractmethod
     def network(self) -> PolicyNetwork:
         """The deterministic policy as it is now."""
+
+    def exploring(self, n: int) -> AbstractContextManager[Act | None]:
+        """The policy as it explores, for ``n`` environments from the begin of their episodes.
+
+        Within the block nothing is learned, and after it all random generators are as before.
+
+        Returns:
+            What yields the policy; None, as by default, where an algorithm does not explore by noise.
+        """
+        return nullcontext(None)
+
+    @classmethod
+    def advice(cls, config: TrainingConfig) -> list[str]:
+        """Reasons why a configuration will hardly learn, a sentence each; none by default.
+
+        Raises:
+            ConfigurationError: it cannot learn at all.
+        """
+        return []
 
     @abstractmethod
     def state(self) -> dict[str, Any]:

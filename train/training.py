@@ -11,11 +11,11 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ..baselines import ClassicalWashout
+from ..baselines import ClassicalWashout, NoMotion
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.progress import Interrupt
 from ..envs.settings import from_dict, to_dict
@@ -29,6 +29,7 @@ from .networks import Actor, start_as_spring_damper
 from .registry import ALGORITHMS, Learner, StopTraining
 from .run import RunFolder
 from .validation import Score, Validation
+from .watch import References, Watch
 
 
 def initial_agent(config: TrainingConfig) -> Agent | None:
@@ -105,6 +106,9 @@ def warm_cosine(progress: float) -> float:
     return _LEAST_RATE + (1.0 - _LEAST_RATE) * 0.5 * (1.0 + math.cos(turn))
 
 
+START: Final = "start"
+"""Name in the log of the controller that a training begins with."""
+
 Tell = Callable[["Status"], None]
 """Receives the status at every boundary."""
 
@@ -118,16 +122,30 @@ class Status:
         total: Actions in all.
         score: Of the last validation.
         best: Score of the best agent so far, in what the configuration calls best; lower is better.
-        reference: J of the washout on the same drives.
+        references: J on the same drives of what the agent is compared with; None before they are measured.
         news: Whether ``score`` is new.
+        drive_share: Share of the variance of rewards that environments in the same drive have in common; None
+            without groups.
+        entropy: Of the actions explored with, where the algorithm tells it.
+        kl: How far the last update moved the policy, likewise.
+        warnings: New since the last status, in plain words.
     """
 
     steps: int
     total: int
     score: Score | None = None
     best: float | None = None
-    reference: float | None = None
+    references: References | None = None
     news: bool = False
+    drive_share: float | None = None
+    entropy: float | None = None
+    kl: float | None = None
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def reference(self) -> float | None:
+        """J of the classical washout on the validation drives."""
+        return None if self.references is None else self.references.washout
 
 
 @dataclass(frozen=True)
@@ -161,13 +179,15 @@ class Training:
         config = run.config if state is None else replace(run.config, initial=None)
         begun = initial_agent(config)
         self._initial = None if begun is None else begun.record
-        self.learner: Learner = ALGORITHMS[config.algo](config)
+        algorithm = ALGORITHMS[config.algo]
+        self._advice = algorithm.advice(config) if state is None else []
+        self.learner: Learner = algorithm(config)
         self.validation = Validation(run.config)
         # As if all sessions had followed each other without a pause.
         self._begun, self._seen = time.perf_counter(), -1
         self._interrupt = interrupt or Interrupt()
         self._caught = self._interrupt.caught if interrupt is None else nullcontext
-        self.status = Status(0, run.config.steps)
+        self.status, self._watch = Status(0, run.config.steps), Watch()
         if state is not None:
             self._go_on(state)
 
@@ -175,10 +195,14 @@ class Training:
         self.learner.restore(state["learner"])
         self._begun -= state["elapsed"]
         self._seen = self.status.steps = self.learner.steps
-        self.status.best, self.status.reference = state["best"], state["reference"]
-        # Checkpoints of early versions have none.
+        self.status.best = state["best"]
+        # Checkpoints of early versions have the washout's J alone, or no score.
+        self.status.references = References(**state.get("references", {"washout": state.get("reference")}))
+        if "watch" in state:
+            self._watch.restore(state["watch"])
         if state.get("score") is not None:
-            self.status.score = Score(**state["score"])
+            score = state["score"]
+            self.status.score = Score(**{**score, "by_drive": tuple(score.get("by_drive", ()))})
         if state["initial"] is not None:
             self._initial = from_dict(Record, state["initial"], "initial")
 
@@ -190,8 +214,10 @@ class Training:
         self.log = TrainingLog(self.run.path, self.status.steps)
         try:
             with self._caught():
-                if self.status.reference is None:
-                    self._measure_reference()
+                if self._advice:
+                    self._say(self._advice)
+                if self.status.references is None:
+                    self.status.references = self._measured_references()
                 self.learner.learn(self._boundary)
                 self._boundary()
                 self.agent("final").save(self.run.final_agent)
@@ -201,18 +227,40 @@ class Training:
             self.log.close()
         return Outcome(self.status, interrupted=False)
 
-    def _measure_reference(self) -> None:
-        washout = ClassicalWashout(DEFAULT, platform_of(self.config.task).cab)
-        score = self.validation.score_policy(washout)
-        self.status.reference = score.cue_error
+    def _say(self, warnings: list[str]) -> None:
+        self.status.warnings = warnings
+        self._tell(self.status)
+        self.status.warnings = []
+
+    def _measured_references(self) -> References:
+        """Washout and standing still, and the base policy where the training begins with it alone."""
+        still = NoMotion()
+        scores = {
+            DEFAULT: self.validation.score_policy(
+                ClassicalWashout(DEFAULT, platform_of(self.config.task).cab)
+            ),
+            still.name: self.validation.score_policy(still),
+        }
+        if self.config.initial is None and base_of(self.config.base, self.config.task) is not None:
+            scores[START] = self.validation.score_base()
+        for name, score in scores.items():
+            self._log_reference(0, name, score)
+        start = scores.get(START)
+        return References(
+            washout=scores[DEFAULT].cue_error,
+            standing=scores[still.name].cue_error,
+            start=None if start is None else start.cue_error,
+        )
+
+    def _log_reference(self, steps: int, name: str, score: Score) -> None:
         scalars = {"J": score.cue_error, "perceived_J": score.perceived_error}
-        self.log.write(0, {f"{DEFAULT}/{name}": value for name, value in scalars.items()})
+        self.log.write(steps, {f"{name}/{scalar}": value for scalar, value in scalars.items()})
 
     def _boundary(self) -> None:
         """Between updates: whatever is due."""
         steps = self.status.steps = self.learner.steps
         last = steps >= self.config.steps
-        self.status.news = False
+        self.status.news, self.status.warnings = False, []
         if self._due(self.config.log_every) or last:
             self.log.write(steps, self.learner.scalars())
         if steps > self._seen and (self._due(self.config.validation.every) or last):
@@ -231,10 +279,21 @@ class Training:
         return self._seen < 0 or self.learner.steps // every > self._seen // every
 
     def _validate(self) -> None:
-        network, status = self.learner.network(), self.status
+        network, status, first = self.learner.network(), self.status, self.status.score is None
         score = self.validation.score(network.acting())
+        with self.learner.exploring(self.validation.noisy_drives) as act:
+            if act is not None:
+                score = self.validation.with_noise(score, act)
         status.score, status.news = score, True
         self.log.write(status.steps, score.scalars())
+        references = status.references or References()
+        if first and references.start is None:
+            # The training begins with its network.
+            references = status.references = replace(references, start=score.cue_error)
+            self._log_reference(status.steps, START, score)
+        status.warnings = self._watch.look(score, references)
+        status.entropy, status.kl = self.log.last("train/entropy"), self.log.last("train/approx_kl")
+        status.drive_share = self.log.last("rollout/drive_share")
         value = rating(score, self.config.validation.best)
         if status.best is None or value < status.best:
             status.best = value
@@ -265,7 +324,8 @@ class Training:
             "learner": self.learner.state(),
             "elapsed": time.perf_counter() - self._begun,
             "best": self.status.best,
-            "reference": self.status.reference,
+            "references": None if self.status.references is None else asdict(self.status.references),
+            "watch": self._watch.state(),
             "score": None if self.status.score is None else asdict(self.status.score),
             "initial": None if self._initial is None else to_dict(self._initial),
         }

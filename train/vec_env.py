@@ -90,6 +90,8 @@ class DrivingSimulatorVecEnv(VecEnv):
         self._returns = np.zeros(num_envs)
         self._sums = np.zeros((num_envs, N_TERMS))
         self._steps = np.zeros(num_envs, dtype=np.int64)
+        # Of the groups' mean rewards: number, sum, sum of squares; and the sum of the variances within.
+        self._groups = np.zeros(4)
 
     def action_of(self, acceleration: ArrayLike) -> NDArray[np.float32]:
         """Actions of the mode "acceleration" for accelerations (..., 9), m/s^2 and rad/s^2."""
@@ -173,8 +175,27 @@ class DrivingSimulatorVecEnv(VecEnv):
         if self.group == 1:
             return reward
         grouped = reward.reshape(-1, self.group)
-        own = grouped - grouped.mean(axis=1, keepdims=True)
-        return (own * (self.group / (self.group - 1.0))).reshape(-1).astype(np.float32)
+        mean = grouped.mean(axis=1, keepdims=True)
+        self._groups += [len(mean), mean.sum(), np.square(mean).sum(), grouped.var(axis=1, ddof=1).sum()]
+        own = grouped - mean
+        return np.asarray(own * (self.group / (self.group - 1.0)), dtype=np.float32).reshape(-1)
+
+    def take_drive_share(self) -> float | None:
+        """Share of the variance of rewards that a group has in common since the last call, and begin anew.
+
+        It is the road's, the machine's and the start's: no action had a part in it. What the members differ
+        by is taken off (one-way analysis of variance).
+
+        Returns:
+            0 to 1; None without groups, or where nothing was played.
+        """
+        count, total, squares, within = self._groups.tolist()
+        self._groups[:] = 0.0
+        if count < 2:
+            return None
+        within /= count
+        common = max((squares - total * total / count) / (count - 1) - within / self.group, 0.0)
+        return common / (common + within) if common + within > 0.0 else None
 
     def _final_info(self, i: int, truncated: bool) -> dict[str, Any]:
         elapsed = round(time.perf_counter() - self._began, 6)
@@ -201,7 +222,8 @@ class DrivingSimulatorVecEnv(VecEnv):
     def snapshot(self) -> Snapshot:
         """Everything that changes, for :meth:`restore` of environments made alike."""
         sums = {"returns": self._returns.copy(), "sums": self._sums.copy(), "steps": self._steps.copy()}
-        return {**self.batch.snapshot(), **{f"episode.{name}": array for name, array in sums.items()}}
+        episodes = {f"episode.{name}": array for name, array in sums.items()}
+        return {**self.batch.snapshot(), **episodes, "groups": self._groups.copy()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a snapshot: the same actions then give the same bits, without a reset.
@@ -212,6 +234,8 @@ class DrivingSimulatorVecEnv(VecEnv):
         self.batch.restore(snapshot)
         for name, array in (("returns", self._returns), ("sums", self._sums), ("steps", self._steps)):
             array[...] = snapshot[f"episode.{name}"]
+        # Snapshots of early versions have none.
+        self._groups[:] = snapshot.get("groups", 0.0)
         self._seeded = True
         self._reset_seeds()
 

@@ -38,7 +38,11 @@ def test_an_agent_comes_of_it(algo, tmp_path, capsys):
     assert main([*words, "--seed", "3", "--envs", "5", "--out", str(out)]) == 0
     told = capsys.readouterr()
     assert "final.safetensors: the agent after" in told.out
-    assert "classical washout" in told.err
+    assert "(washout " in told.err
+    # Its gamma is of a few seconds: said once, before it trains.
+    assert told.err.splitlines()[0].startswith("warning: hyperparameters: gamma")
+    assert told.err.count("s, but its travel costs after") == 1
+    assert f"{out / 'learning.png'}: J over the actions" in told.out
 
     config = load(TrainingConfig, out / "config.yaml")
     assert (config.algo, config.seed, config.n_envs) == (algo, 3, 5)
@@ -78,7 +82,7 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     assert process.stderr is not None
     seen = ""
     # The line of the second validation: it trains.
-    while seen.count(" steps  J ") < 2:
+    while seen.count(" J ") < 2:
         line = process.stderr.readline()
         assert line, seen
         seen += line

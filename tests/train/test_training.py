@@ -7,11 +7,16 @@ import json
 import numpy as np
 import pytest
 
+from motion_cueing.baselines import ClassicalWashout, NoMotion
 from motion_cueing.envs.errors import ConfigurationError, DataError
+from motion_cueing.envs.task.episode import platform_of
 from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.train.agents import Agent
+from motion_cueing.train.logs import read_log
 from motion_cueing.train.run import RunFolder, checkpoints_in, read_checkpoint, write_checkpoint
 from motion_cueing.train.training import Training
+from motion_cueing.train.validation import Validation
+from motion_cueing.train.watch import References
 
 from . import tiny
 from .agents import RECORD, recurrent
@@ -155,6 +160,69 @@ def test_an_algorithm_without_memory_does_not_begin_with_one(tmp_path):
     config = tiny.config(tmp_path, "apg", initial=str(tmp_path / "lstm.safetensors"))
     with pytest.raises(DataError, match="initial: apg trains no network with a memory, which the agent has"):
         Training(RunFolder.create(tmp_path / "run", config))
+
+
+def test_a_person_sees_references_noise_and_warnings_once_and_no_more_when_it_goes_on(tmp_path):
+    task = {"action": {"mode": "residual"}}
+    config = tiny.config(tmp_path, "ppo", task=task, validation={"every": 64}, group=2)
+    folder = RunFolder.create(tmp_path / "run", config)
+    seen = []
+
+    def tell(status):
+        seen.append((status.steps, status.news, list(status.warnings), status.references))
+        if status.steps >= 128:
+            training._interrupt.asked = True
+
+    training = Training(folder, tell)
+    assert training.train().interrupted
+    # A trace of 0.2 s: said before anything is measured.
+    steps, news, (sentence,), references = seen[0]
+    assert (steps, news, references) == (0, False, None)
+    assert "s, but its travel costs after" in sentence
+    assert not any(sentence in warnings for _, _, warnings, _ in seen[1:])
+    validation = Validation(config)
+    washout = validation.score_policy(ClassicalWashout("classical", platform_of(config.task).cab))
+    assert seen[-1][3] == References(
+        washout=washout.cue_error,
+        standing=validation.score_policy(NoMotion()).cue_error,
+        start=validation.score(lambda o: np.zeros((len(o), 9))).cue_error,
+    )
+    first = read_log(folder.path)[0]
+    assert first["start/J"] == pytest.approx(seen[-1][3].start, rel=1e-8)
+    assert {
+        "classical/J",
+        "no-motion/J",
+        "validation/noise_cost",
+        "validation/carriage_travel",
+    } <= first.keys()
+    told = seen.copy()
+    status = Training(RunFolder.open(folder.path), tell).train().status
+    assert status.references == told[-1][3]
+    assert not any(sentence in warnings for _, _, warnings, _ in seen[len(told) :])
+    assert {"train/entropy", "train/approx_kl", "rollout/drive_share"} <= read_log(folder.path)[-1].keys()
+    assert 0.0 <= status.drive_share <= 1.0
+    assert status.entropy is not None
+    assert status.kl is not None
+
+
+def test_without_a_base_it_begins_with_its_network(tmp_path):
+    config = tiny.config(tmp_path, "td3", normalize=_NOT_NORMALIZED)
+    training = Training(RunFolder.create(tmp_path / "run", config))
+    network = training.learner.network()
+    start = training.train().status.references.start
+    assert start == training.validation.score(network).cue_error
+
+
+def test_a_checkpoint_of_before_has_the_washout_alone(finished):
+    state = read_checkpoint(checkpoints_in(finished.checkpoints)[-1])
+    washout = state.pop("references")["washout"]
+    del state["watch"]
+    for name in ("carriage_travel", "leg_travel", "at_ends", "by_drive", "noise"):
+        del state["score"][name]
+    training = Training(RunFolder.open(finished.path))
+    training._go_on({**state, "reference": washout})
+    assert training.status.references == References(washout=washout)
+    assert training.status.reference == washout
 
 
 def test_only_the_latest_checkpoints_are_kept(tmp_path):

@@ -12,8 +12,10 @@ from motion_cueing.baselines import ClassicalWashout, NoMotion
 from motion_cueing.envs.errors import DataError
 from motion_cueing.envs.task import DrivingSimulator
 from motion_cueing.envs.task.kernels.reward import TERMS
+from motion_cueing.envs.task.options import load_task
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.metrics import measure
+from motion_cueing.train.config import load_config
 from motion_cueing.train.logs import Monitor, TrainingLog, read_log
 from motion_cueing.train.validation import Validation, tilt_rate
 
@@ -60,6 +62,62 @@ def test_scores_are_means_over_a_loop_of_single_environments(validation):
     assert score.limited == score.terms["limits"]
     assert [score.terms[name] for name in TERMS] == pytest.approx(np.mean(terms, axis=0), rel=1e-6)
     assert score == validation.score(act)
+
+
+def test_travel_and_ends_are_those_of_the_machine(validation):
+    def act(observation):
+        action = np.zeros((len(observation), 9), dtype=np.float32)
+        action[:, 0] = 0.3
+        return action
+
+    used, ends, by_drive = [], [], []
+    for drive in validation._batch.drives:
+        env = DrivingSimulator(validation.task, drives=[drive])
+        seen, _ = env.reset(seed=0)
+        carriage, done, errors = env.batch.platform.carriage, False, []
+        used.append(0.0)
+        while not done:
+            seen, _, terminated, truncated, info = env.step(act(seen[None])[0])
+            state, done = env.batch.simulator.state[0], terminated or truncated
+            used[-1] = max(used[-1], state["motion"]["position"][0] / carriage.travel_x[1])
+            ends.append(any((int(state["limits"]) >> 4 * k) & 1 for k in range(9)))
+            errors.append(info["cue_error"])
+        by_drive.append(np.mean(errors))
+    score = validation.score(act)
+    assert score.carriage_travel == pytest.approx(np.mean(used), rel=1e-6)
+    assert score.leg_travel < 1e-6
+    # It stops at the end of its travel.
+    assert 0.9 < score.carriage_travel <= 1.0 + 1e-9
+    assert score.at_ends == pytest.approx(np.mean(ends))
+    assert 0.01 < score.at_ends < 1.0
+    assert score.by_drive == pytest.approx(by_drive, rel=1e-6)
+    assert np.mean(score.by_drive) == pytest.approx(score.cue_error)
+
+
+def test_the_cost_of_noise_is_what_it_adds_to_j(validation):
+    def still(observation):
+        return np.zeros((len(observation), 9))
+
+    def loud(observation):
+        return np.full((len(observation), 9), 0.02)
+
+    score = validation.score(still)
+    assert score.noise is None
+    assert "validation/noise_cost" not in score.scalars()
+    same, other = validation.with_noise(score, still), validation.with_noise(score, loud)
+    assert same.noise == 0.0
+    assert other.noise == pytest.approx(validation.score(loud).cue_error - score.cue_error)
+    told = other.scalars()
+    assert told["validation/noisy_J"] - told["validation/J"] == pytest.approx(told["validation/noise_cost"])
+
+
+def test_the_base_alone_and_the_washout_are_measured_where_rewards_are_against_the_base(tmp_path):
+    task = load_task("cueing", episode={"library": 2, "drive_duration": 6.0, "duration": 1.0})
+    config = load_config("ppo", task=task, validation={"drives": 2, "duration": 5.0})
+    validation = Validation(config)
+    alone = validation.score_base()
+    assert alone.reward == pytest.approx(0.0, abs=1e-5)
+    assert 0.0 < alone.cue_error < validation.score_policy(NoMotion()).cue_error
 
 
 def test_a_drive_that_fails_counts_until_then(tmp_path):

@@ -154,3 +154,36 @@ def test_staggered_first_episodes_end_one_after_another_and_the_next_are_whole()
             ends.append((k, int(i)))
     # 120 time steps are 15 actions of 8: first a third, two thirds and all of them.
     assert ends == sorted((k, i) for i in range(6) for k in range(5 * (1 + i // 2), 46, 15) if k <= 45)
+
+
+def test_the_drives_share_is_that_of_an_analysis_of_variance():
+    episode = {"library": 6, "drive_duration": 3.0, "duration": 1.0}
+    envs = DrivingSimulatorVecEnv(6, "cueing", episode=episode, group=3)
+    assert envs.take_drive_share() is None
+    envs.seed(11)
+    envs.reset()
+    rng, rewards = np.random.default_rng(0), []
+    for k in range(10):
+        envs.step(rng.uniform(-1.0, 1.0, (6, 4)).astype(np.float32))
+        rewards.append(envs.batch.arrays.reward.pull().astype(float).reshape(2, 3))
+        if k == 4:
+            # Goes on from here in other environments.
+            between = envs.snapshot()
+            envs = DrivingSimulatorVecEnv(6, "cueing", episode=episode, group=3)
+            envs.restore(between)
+    groups = np.concatenate(rewards)
+    # Mean squares between and within 20 groups of 3.
+    square_between = 3.0 * ((groups.mean(axis=1) - groups.mean()) ** 2).sum() / 19.0
+    square_within = ((groups - groups.mean(axis=1, keepdims=True)) ** 2).sum() / 40.0
+    common = (square_between - square_within) / 3.0
+    share = envs.take_drive_share()
+    assert share == pytest.approx(common / (common + square_within), rel=1e-4)
+    assert 0.3 < share < 1.0
+    assert envs.take_drive_share() is None
+
+
+def test_without_groups_there_is_no_drives_share():
+    envs = DrivingSimulatorVecEnv(2, "cueing", episode={"library": 2, "drive_duration": 3.0, "duration": 1.0})
+    envs.reset()
+    envs.step(np.zeros((2, 4), dtype=np.float32))
+    assert envs.take_drive_share() is None

@@ -167,18 +167,41 @@ class TrainingProgress:
         bar.move(status.steps, note=f"{speed:,.0f} a second" if speed else "")
         if status.news:
             self._all.line(f"{before}{validation_line(status)}")
+        for sentence in status.warnings:
+            self._all.line(f"{before}warning: {sentence}")
 
 
 def validation_line(status: Status) -> str:
-    """One line about the last validation."""
+    """One line about the last validation, of 120 characters: what is unknown is left out."""
     score = status.score
     assert score is not None
-    washout = f" (classical washout {status.reference:.2f})" if status.reference is not None else ""
-    return (
-        f"{status.steps:>12,} steps  J {score.cue_error:.2f}{washout}, "
-        f"perceived {score.perceived_error:.2f}, reward {score.reward:.2f}, "
-        f"limited {100.0 * score.limited:.2f} %"
-    )
+    beside = {} if status.references is None else status.references.shown()
+    parts = [f"{_short(status.steps):>5} J {_three(score.cue_error)}"]
+    if beside:
+        parts.append(f"({' '.join(f'{name} {_three(value)}' for name, value in beside.items())})")
+    if score.noise is not None:
+        parts.append(f"noise {'+' if score.noise >= 0.0 else '-'}{_three(abs(score.noise))}")
+    if status.drive_share is not None:
+        parts.append(f"drive {100.0 * status.drive_share:.0f}%")
+    used = f"{100.0 * score.carriage_travel:.0f}/{100.0 * score.leg_travel:.0f}%"
+    parts.append(f"travel {used} limits {100.0 * score.limited:.1f}%")
+    if status.entropy is not None:
+        parts.append(f"entropy {status.entropy:.1f}")
+    if status.kl is not None:
+        parts.append(f"KL {status.kl:.3f}")
+    return " ".join(parts)
+
+
+def _three(value: float) -> str:
+    """A number with about three digits, without exponent."""
+    return f"{value:.2f}" if abs(value) < 9.995 else f"{value:.1f}" if abs(value) < 99.95 else f"{value:.0f}"
+
+
+def _short(steps: int) -> str:
+    """Actions in at most five characters: 320, 12.8k, 1.25M."""
+    if steps < 1_000:
+        return str(steps)
+    return f"{steps / 1e3:.3g}k" if steps < 999_500 else f"{steps / 1e6:.3g}M"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from types import SimpleNamespace
 from typing import Any, Final, get_type_hints
 
@@ -30,9 +31,11 @@ from ...logs import Monitor
 from ...networks import TORCH_ACTIVATIONS
 from ...registry import Boundary, Learner, State
 from ...training import initial_network
+from ...validation import Act
 from ...vec_env import DrivingSimulatorVecEnv
+from .advice import advice
 from .policy import CLASSES, SkipPolicy, load_network, network_of
-from .state import restore, restore_random, state_of
+from .state import exploring, restore, restore_random, state_of
 
 SCHEDULED: Final = "lin_"
 """Before a number: it falls linearly to zero at the end of the training."""
@@ -232,7 +235,11 @@ class SB3Learner(Learner):
         logged = self._logged()
         self.model.logger.name_to_value.clear()
         self.model.logger.name_to_count.clear()
-        return {**self.monitor.take(), **logged}
+        if "train/entropy_loss" in logged:
+            logged["train/entropy"] = -logged["train/entropy_loss"]
+        share = self.simulators.take_drive_share()
+        drives = {} if share is None else {"rollout/drive_share": share}
+        return {**self.monitor.take(), **drives, **logged}
 
     def _logged(self) -> dict[str, float]:
         values: dict[str, Any] = self.model.logger.name_to_value
@@ -241,6 +248,15 @@ class SB3Learner(Learner):
     def network(self) -> PolicyNetwork:
         """The deterministic policy with its normalization."""
         return network_of(self.model, self.normalize)
+
+    def exploring(self, n: int) -> AbstractContextManager[Act | None]:
+        """The policy with the noise it explores with, for ``n`` environments."""
+        return exploring(self.model, self.normalize, n)
+
+    @classmethod
+    def advice(cls, config: TrainingConfig) -> list[str]:
+        """Reasons why a configuration will hardly learn."""
+        return advice(config, CLASSES[config.algo])
 
     def state(self) -> dict[str, Any]:
         """Weights, optimizers, replay buffer, normalization, environments, random generators, log."""

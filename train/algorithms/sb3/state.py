@@ -5,12 +5,16 @@ Not in it: PyTorch's generator on a GPU.
 
 from __future__ import annotations
 
+import copy
 from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from sb3_contrib import RecurrentPPO
 from sb3_contrib.common.recurrent.type_aliases import RNNStates
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -41,10 +45,57 @@ def state_of(
         "replay": _replay(model),
         "normalize": None if normalize is None else _statistics(normalize),
         "simulators": simulators.snapshot(),
+        **_randomness(model),
+    }
+
+
+def _randomness(model: BaseAlgorithm) -> dict[str, Any]:
+    """Random generators, and noise that lasts."""
+    return {
         "random": _random(model),
         "noise": {name: getattr(_noisy(model), name) for name in _NOISE} if _noisy(model) else {},
         "walks": [walk.noise_prev.copy() for walk in _walks(model)],
     }
+
+
+@contextmanager
+def exploring(
+    model: BaseAlgorithm, normalize: VecNormalize | None, n: int
+) -> Iterator[Callable[[NDArray[np.float32]], NDArray[np.float32]]]:
+    """The policy with the noise it explores with, for ``n`` environments, always the same draws.
+
+    After the block generators and noise of the model are as before.
+    """
+    before, policy = _randomness(model), model.policy
+    noise = getattr(model, "action_noise", None)
+    if noise is not None:
+        one = noise.noises[0] if isinstance(noise, VectorizedActionNoise) else noise
+        noise = VectorizedActionNoise(copy.deepcopy(one), n)
+        noise.reset()
+
+    memory: Any = None
+    begins = np.ones(n, dtype=bool)
+
+    def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        nonlocal memory
+        seen: Any = observation if normalize is None else normalize.normalize_obs(observation)
+        action, memory = model.predict(seen, memory, begins, deterministic=False)
+        begins[...] = False
+        if noise is None:
+            return action
+        # As OffPolicyAlgorithm adds it: in an action space of -1 to 1.
+        return policy.unscale_action(np.clip(policy.scale_action(action) + noise(), -1.0, 1.0))
+
+    try:
+        # Not that of a GPU, which could not be put back.
+        torch.default_generator.manual_seed(0)
+        np.random.seed(0)  # noqa: NPY002
+        if _noisy(model):
+            policy_with_noise: Any = policy
+            policy_with_noise.reset_noise(n)
+        yield act
+    finally:
+        restore_random(before, model)
 
 
 def restore(
