@@ -17,6 +17,7 @@ import sys
 import tempfile
 import types
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 from unittest.mock import patch
@@ -190,6 +191,12 @@ def link_packages() -> None:
             (folder / name).symlink_to(DOCS.parent / name)
 
 
+def learning_tasks() -> str:
+    """The file of a task for learning."""
+    file = resources.files("motion_cueing.envs.task") / "presets" / "cueing-preview.yaml"
+    return f"```yaml\n{file.read_text(encoding='utf-8')}```"
+
+
 def write_tables() -> None:
     """Fill ``build/generated``."""
     from motion_cueing.envs.task.kernels.observation import observation_table
@@ -200,6 +207,7 @@ def write_tables() -> None:
         **definitions(),
         **configuration_tables(),
         "observation-rows": observation_table(),
+        "learning-tasks": learning_tasks(),
         "reward-terms": reward_table(),
         "action-scale": action_table(),
         "command-line": command_line(),
