@@ -14,7 +14,7 @@ from tensordict import TensorDict
 from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
 from torch import nn
 from torchrl.collectors import Collector
-from torchrl.data import Bounded, Composite, Unbounded
+from torchrl.data import Binary, Bounded, Composite, Unbounded
 from torchrl.envs import EnvBase
 from torchrl.modules import IndependentNormal, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
@@ -37,7 +37,9 @@ class Cueing(EnvBase):
         actions = (num_envs, self.simulators.batch.action_size)
         self.action_spec = Bounded(-1.0, 1.0, shape=actions)
         self.reward_spec = Unbounded((num_envs, 1))
-        self.add_truncated_keys()
+        ends = ("done", "terminated", "truncated")
+        flag = Binary(1, (num_envs, 1), dtype=torch.bool)
+        self.done_spec = Composite(dict.fromkeys(ends, flag), shape=[num_envs])
 
     def _reset(self, tensordict: TensorDict | None = None, **_: object) -> TensorDict:
         return TensorDict({"observation": self.now.clone()}, self.batch_size)
