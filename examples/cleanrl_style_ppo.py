@@ -1,6 +1,6 @@
 """PPO in one file, in the style of CleanRL: a plain loop over the native batch, with PyTorch alone.
 
-Run it with ``python examples/cleanrl_style_ppo.py --steps 200000``; ``--help`` shows every argument. The
+Run it with ``python examples/cleanrl_style_ppo.py --steps 400000``; ``--help`` shows every argument. The
 loop is that of CleanRL's ``ppo_continuous_action.py`` (Huang et al. 2022, JMLR 23:274), with one
 difference: the value of the last state counts where an episode is truncated. A batch that begins anew in
 the same step has that state in ``final_obs``.
@@ -11,54 +11,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import comparison
 import gymnasium
 import numpy as np
 import torch
 import tyro
 from torch import nn
 
-import motion_cueing.envs
-from motion_cueing.baselines import ClassicalWashout
-from motion_cueing.envs.maneuvers import get_maneuver
-from motion_cueing.envs.task import ActionOptions, EpisodeOptions, ObservationOptions, TaskOptions
-from motion_cueing.evaluation import measure, rollout
-from motion_cueing.train.agents import Agent, Network, Record
-
-TASK = TaskOptions(
-    observation=ObservationOptions(preview=10, preview_spacing=0.1, frame="cab"),
-    action=ActionOptions(mode="residual", authority=0.1, repeat=5, frame="cab"),
-    episode=EpisodeOptions(duration=15.0, random_start=True),
-)
+import motion_cueing.envs  # noqa: F401  (registers the environments)
+from motion_cueing.train.agents import Network
+from motion_cueing.train.networks import linear_layers, weights_of
 
 
 @dataclass
-class Args:
-    """PPO on random drives, a residual on the washout."""
+class Args(comparison.Args):
+    """PPO on random drives, with commands on a linear washout."""
 
-    steps: int = 200_000
-    """Actions in all."""
-    num_envs: int = 64
-    """Environments in the batch."""
-    num_steps: int = 128
-    """Actions in each environment between two updates."""
     epochs: int = 10
     """Passes over a rollout."""
-    minibatch: int = 2048
+    minibatch: int = 64
     """Actions in a gradient."""
-    learning_rate: float = 1e-3
+    learning_rate: float = 3e-4
     """At the beginning; it falls to zero."""
-    gamma: float = 0.97
+    gamma: float = 0.99
     """Discount."""
     gae_lambda: float = 0.95
     """Of the generalized advantage estimation."""
     clip: float = 0.2
     """Largest change of a probability ratio that pays."""
-    reward_scale: float = 0.02
-    """Brings returns to the order of one."""
-    seed: int = 0
-    """Of weights, noise and drives."""
-    maneuver: str = "lane-change"
-    """Maneuver on which the agent is compared with the washout."""
 
 
 class ActorCritic(nn.Module):
@@ -66,11 +46,13 @@ class ActorCritic(nn.Module):
 
     def __init__(self, size: int, action_size: int) -> None:
         super().__init__()
-        self.actor = nn.Sequential(nn.Linear(size, 64), nn.Tanh(), nn.Linear(64, action_size))
+        self.actor = nn.Sequential(
+            nn.Linear(size, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, action_size)
+        )
         self.critic = nn.Sequential(
             nn.Linear(size, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, 1)
         )
-        self.log_std = nn.Parameter(torch.full((action_size,), -1.5))
+        self.log_std = nn.Parameter(torch.zeros(action_size))
         nn.init.zeros_(self.actor[-1].weight)
         nn.init.zeros_(self.actor[-1].bias)
 
@@ -101,7 +83,7 @@ def play(
 ) -> tuple[Rollout, torch.Tensor]:
     """The next rollout, and the observation after it."""
     rows: list[tuple[torch.Tensor, ...]] = []
-    for _ in range(args.num_steps):
+    for _ in range(args.rollout):
         with torch.no_grad():
             distribution, value = agent.distribution(observation), agent.value(observation)
             action = distribution.sample()
@@ -114,7 +96,7 @@ def play(
             last = torch.as_tensor(np.stack(info["final_obs"][cut]))
             with torch.no_grad():
                 future[torch.as_tensor(cut)] = args.gamma * agent.value(last)
-        gained = args.reward_scale * torch.as_tensor(reward, dtype=torch.float32)
+        gained = torch.as_tensor(reward, dtype=torch.float32)
         ended = torch.as_tensor(terminated | truncated)
         rows.append((observation, action, log_prob, gained, future, ended, value))
         observation = torch.as_tensor(following)
@@ -159,49 +141,32 @@ def update(
             optimizer.step()
 
 
-def train(args: Args) -> Agent:
-    """Play and update, until the actions are used up."""
+def train(args: Args) -> tuple[ActorCritic, int]:
+    """Play and update, until the actions are used up; returns what has learned, and the actions taken."""
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
     envs = gymnasium.make_vec(
-        motion_cueing.envs.ENVIRONMENT_ID,
-        num_envs=args.num_envs,
-        task=TASK,
-        base=ClassicalWashout(),
-        autoreset_mode="SameStep",
+        "motion_cueing/CueingPreview-v0", num_envs=args.num_envs, autoreset_mode="SameStep"
     )
     (size,), (action_size,) = envs.single_observation_space.shape, envs.single_action_space.shape
     agent = ActorCritic(size, action_size)
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     observation = torch.as_tensor(envs.reset(seed=args.seed)[0])
-    updates = max(1, args.steps // (args.num_envs * args.num_steps))
+    updates = max(1, args.steps // (args.num_envs * args.rollout))
     for k in range(updates):
         optimizer.param_groups[0]["lr"] = args.learning_rate * (1.0 - k / updates)
         played, observation = play(envs, agent, observation, args)
         with torch.no_grad():
             after = agent.value(observation)
         update(agent, optimizer, played, advantages(played, after, args), args)
-        print(f"update {k + 1} of {updates}: mean reward {played.reward.mean() / args.reward_scale:.2f}")
-    return exported(agent, updates * args.num_envs * args.num_steps, args.seed)
-
-
-def exported(agent: ActorCritic, steps: int, seed: int) -> Agent:
-    """The actor as an agent that needs no PyTorch."""
-    layers = [layer for layer in agent.actor if isinstance(layer, nn.Linear)]
-    network = Network(
-        weights=tuple(layer.weight.detach().numpy() for layer in layers),
-        biases=tuple(layer.bias.detach().numpy() for layer in layers),
-    )
-    return Agent("cleanrl-style", TASK, network, Record(algo="ppo", seed=seed, steps=steps), base="classical")
+        print(f"update {k + 1} of {updates}: mean reward {played.reward.mean():.3f}")
+    return agent, updates * args.num_envs * args.rollout
 
 
 def main(args: Args) -> None:
-    """Train, save, and print J of the agent and of the washout: 0 is perfect."""
-    agent = train(args)
-    agent.save("cleanrl-style.safetensors")
-    cues = get_maneuver(args.maneuver).drive()
-    for policy in (ClassicalWashout(), agent):
-        print(f"{policy.name:<20} J = {measure(rollout(policy, cues)).cue_error:6.3f}")
+    """Train, save, and print J of the agent and of its washout."""
+    agent, steps = train(args)
+    comparison.save_and_compare(Network(*weights_of(linear_layers(agent.actor))), steps, args)
 
 
 if __name__ == "__main__":

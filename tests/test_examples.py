@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import subprocess
 import sys
@@ -10,7 +11,10 @@ import numpy as np
 import pytest
 import torch
 
-from motion_cueing.envs.maneuvers import get_maneuver
+from motion_cueing.baselines import make_policy
+from motion_cueing.envs.task.batch import Batch
+from motion_cueing.envs.task.options import load_task
+from motion_cueing.envs.task.vector import DrivingSimulatorVector
 from motion_cueing.evaluation import measure, rollout
 from motion_cueing.train.agents import Agent
 
@@ -18,14 +22,24 @@ from .repository import ROOT
 
 pytestmark = pytest.mark.slow
 
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-TINY = {
-    "train_with_stable_baselines3": ["1", "braking"],
-    "cleanrl_style_ppo": [
-        "--steps=48", "--num-envs=3", "--num-steps=8", "--epochs=2", "--minibatch=10", "--maneuver=braking",
-    ],
-}  # fmt: skip
-"""Arguments of trainings that take seconds."""
+PLACE = ROOT / "examples"
+TRAININGS = {
+    "cleanrl_style_ppo": None,
+    "train_with_sbx": "sbx",
+    "train_with_skrl": "skrl",
+    "train_with_stable_baselines3": None,
+    "train_with_torchrl": "torchrl",
+}
+"""Examples of training, with the library and extra that each needs beyond the extra ``train``."""
+SHARED = "comparison"
+"""What those examples share; it is none itself."""
+EXAMPLES = sorted(path for path in PLACE.glob("*.py") if path.stem not in {*TRAININGS, SHARED})
+
+
+def need(library: str | None) -> None:
+    """Skip the test where a library is not installed."""
+    if library is not None and importlib.util.find_spec(library) is None:
+        pytest.skip(f"needs the extra {library}")
 
 
 def lines_of(example, cwd, *arguments) -> list[str]:
@@ -36,26 +50,43 @@ def lines_of(example, cwd, *arguments) -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize("example", [e for e in EXAMPLES if e.stem not in TINY], ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_it_runs_and_prints(example, tmp_path):
     assert lines_of(example, tmp_path)
 
 
-@pytest.mark.parametrize("name", sorted(TINY))
-def test_a_trained_agent_is_held_against_the_washout(name, tmp_path):
-    lines = lines_of(ROOT / "examples" / f"{name}.py", tmp_path, *TINY[name])
+@pytest.fixture(scope="module")
+def unseen():
+    """The first two of the drives that no training has seen."""
+    return Batch(1, load_task("cueing-preview", episode={"library": 2, "library_seed": 1_000_000})).drives
+
+
+@pytest.mark.parametrize("name", sorted(TRAININGS))
+def test_a_trained_agent_is_held_against_its_washout(name, unseen, tmp_path):
+    need(TRAININGS[name])
+    words = [
+        "--steps=128",
+        "--num-envs=8",
+        "--rollout=16",
+        "--drives=2",
+        "--seed=3",
+        "--out=mine.safetensors",
+    ]
+    lines = lines_of(PLACE / f"{name}.py", tmp_path, *words)
     found = {line.split()[0]: float(line.split()[-1]) for line in lines if " J = " in line}
-    (file,) = tmp_path.glob("*.safetensors")
-    agent = Agent.load(file)
-    assert set(found) == {"classical", agent.name}
-    # Three decimals are printed.
-    cues = get_maneuver("braking").drive()
-    assert found[agent.name] == pytest.approx(measure(rollout(agent, cues)).cue_error, abs=6e-4)
-    assert agent.record.steps == {"cleanrl_style_ppo": 48, "train_with_stable_baselines3": 64 * 128}[name]
+    agent = Agent.load(tmp_path / "mine.safetensors")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.safetensors"]
+    assert found.keys() == {"linear-washout", "mine"}
+    for policy in (agent, make_policy("linear-washout", agent.platform)):
+        errors = [measure(rollout(policy, cues)).cue_error for cues in unseen]
+        # The batch scores where actions end, a rollout everywhere; three decimals are printed.
+        assert found[policy.name] == pytest.approx(np.mean(errors), rel=2e-3)
+    assert agent.task == load_task("cueing-preview")
+    assert (agent.record.steps, agent.record.seed) == (128, 3)
 
 
 def test_policies_are_compared_best_first(tmp_path):
-    lines = lines_of(ROOT / "examples" / "compare_policies.py", tmp_path, "braking")
+    lines = lines_of(PLACE / "compare_policies.py", tmp_path, "braking")
     table = {line.split()[0]: float(line.split()[-1]) for line in lines if " J = " in line}
     assert set(table) == {"no-motion", "classical", "carriage-on-springs"}
     assert list(table.values()) == sorted(table.values())
@@ -63,7 +94,7 @@ def test_policies_are_compared_best_first(tmp_path):
 
 
 def test_a_controller_of_ones_own_beats_standing_still(tmp_path):
-    lines = lines_of(ROOT / "examples" / "own_controller.py", tmp_path, "braking")
+    lines = lines_of(PLACE / "own_controller.py", tmp_path, "braking")
     assert lines[0].split()[:3] == ["maneuver", "policy", "J"]
     rows = [line.split() for line in lines[1:]]
     found = {policy: (float(error), float(sensed)) for _, policy, error, sensed, *_ in rows}
@@ -73,16 +104,19 @@ def test_a_controller_of_ones_own_beats_standing_still(tmp_path):
     assert found["no-motion"][0] == pytest.approx(7.41, abs=0.02)
 
 
-@pytest.fixture(scope="module")
-def ppo():
-    """The example of a plain loop, as a module."""
-    place = ROOT / "examples" / "cleanrl_style_ppo.py"
-    spec = importlib.util.spec_from_file_location("cleanrl_style_ppo", place)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[spec.name]
+@pytest.fixture
+def example(monkeypatch):
+    """Loads an example as a module."""
+    monkeypatch.syspath_prepend(PLACE)
+    yield importlib.import_module
+    for name in (*TRAININGS, SHARED):
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def ppo(example):
+    """The example of a plain loop."""
+    return example("cleanrl_style_ppo")
 
 
 class Clock:
@@ -104,7 +138,7 @@ class Clock:
 
 
 def test_the_plain_loop_values_what_was_cut_off_and_not_what_failed(ppo):
-    args = ppo.Args(num_steps=4, reward_scale=0.5)
+    args = ppo.Args(rollout=4)
     agent = ppo.ActorCritic(1, 1)
     played, after = ppo.play(Clock(), agent, torch.zeros(2, 1), args)
     value = args.gamma * agent.value(torch.tensor([[3.0]])).item()
@@ -114,7 +148,7 @@ def test_the_plain_loop_values_what_was_cut_off_and_not_what_failed(ppo):
     np.testing.assert_allclose(played.future.numpy(), expected, rtol=1e-6)
     assert played.observation[:, :, 0].tolist() == [[0, 0], [1, 1], [2, 2], [0, 0]]
     assert played.ended.tolist() == [[False, False], [False, False], [True, True], [False, False]]
-    assert played.reward[0].tolist() == [0.5, 1.0]
+    assert played.reward[0].tolist() == [1.0, 2.0]
     assert after.tolist() == [[1.0], [1.0]]
 
 
@@ -137,3 +171,28 @@ def test_the_plain_loop_estimates_advantages_as_their_definition_does(ppo):
     columns = (torch.tensor(c)[:, None] for c in (reward, future, ended, value))
     found = ppo.advantages(ppo.Rollout(nothing, nothing, nothing, *columns), torch.tensor([after]), args)
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-6)
+
+
+def test_torchrl_values_the_last_observation_of_an_episode_and_begins_the_next(example):
+    need("torchrl")
+    import tensordict
+    from torchrl.envs.utils import check_env_specs
+
+    task = load_task("cueing-preview", episode={"library": 2, "drive_duration": 8.0, "duration": 0.32})
+    torchrl = example("train_with_torchrl")
+    torchrl.TASK = task
+    env = torchrl.Cueing(2, seed=5)
+    check_env_specs(env)
+    env = torchrl.Cueing(2, seed=5)
+    actions = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (6, 2, 4)).astype(np.float32))
+    batch = DrivingSimulatorVector(2, task, autoreset_mode="SameStep")
+    observation, _ = batch.reset(seed=5)
+    now = env.reset()
+    for action in actions:
+        np.testing.assert_array_equal(now["observation"].numpy(), observation)
+        played, now = env.step_and_maybe_reset(now.update(tensordict.TensorDict({"action": action}, [2])))
+        observation, reward, _, truncated, info = batch.step(action.numpy())
+        last = np.stack(info["final_obs"]) if truncated.all() else observation
+        np.testing.assert_array_equal(played["next", "observation"].numpy(), last)
+        np.testing.assert_allclose(played["next", "reward"][:, 0].numpy(), reward, rtol=1e-6)
+        assert played["next", "truncated"][:, 0].tolist() == truncated.tolist()
