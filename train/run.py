@@ -88,6 +88,11 @@ def _packed(value: Any) -> Any:
         payload = io.BytesIO()
         np.save(payload, value, allow_pickle=False)
         return {_ARRAY: torch.frombuffer(bytearray(payload.getvalue()), dtype=torch.uint8)}
+    if value is not None and not isinstance(value, bool | int | float | str | torch.Tensor):
+        raise ConfigurationError(
+            f"checkpoints: a {type(value).__name__} cannot be kept in one, such as the memory of predictive "
+            "control under an agent; set checkpoints.every to 0, or take another base"
+        )
     return value
 
 
