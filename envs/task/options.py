@@ -189,5 +189,6 @@ def task_values(values: object) -> Any:
         values = _values_of(values)
     if isinstance(values, Mapping) and "preset" in values:
         rest = {name: value for name, value in values.items() if name != "preset"}
-        return load_task(str(values["preset"]), **rest)
+        # None for all defaults, where another file named a preset before.
+        return rest if values["preset"] is None else load_task(str(values["preset"]), **rest)
     return values

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,9 @@ from motion_cueing.baselines.washout import load_washout
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
 from motion_cueing.envs.maneuvers import drive_seeds, maneuver_names, recording_names
 from motion_cueing.envs.settings import load, save
+from motion_cueing.envs.task import ActionOptions, TaskOptions
 from motion_cueing.envs.task.episode import library_of
+from motion_cueing.envs.task.options import load_task
 from motion_cueing.train.config import (
     Choice,
     TrainingConfig,
@@ -78,13 +81,28 @@ def test_a_preset_round_trips_through_yaml_and_is_its_own_configuration(name, tm
     assert load_config(None, tmp_path / "config.yaml") == config
 
 
-def test_ppo_has_large_batches_from_many_environments():
-    config = load_config("ppo")
-    assert config.n_envs >= 64
-    assert config.hyperparameters["batch_size"] == 4096
-    assert config.hyperparameters["n_epochs"] == 3
-    assert config.task.action.repeat == 5
+@pytest.mark.parametrize("name", ["ppo", "trpo", "recurrent-ppo", "sac", "td3", "tqc", "crossq"])
+def test_algorithms_of_stable_baselines_learn_the_task_for_it_in_groups(name):
+    config = load_config(name)
+    assert config.task == load_task("cueing-preview")
+    assert config.n_envs % config.group == 0
+    assert config.group > 1
+    assert not config.normalize.observation
     assert config.threads == 1
+
+
+def test_a_task_is_changed_field_by_field_or_begun_anew(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("task: {action: {repeat: 10}}\n")
+    known = load_task("cueing-preview")
+    assert load_config("ppo", file).task == replace(known, action=replace(known.action, repeat=10))
+    file.write_text("task: {preset: cueing}\n")
+    assert load_config("ppo", file).task == load_task("cueing")
+    file.write_text("task: {preset: null, action: {repeat: 10}}\n")
+    assert load_config("ppo", file).task == TaskOptions(action=ActionOptions(repeat=10))
+    file.write_text("n_envs: 6\ngroup: 4\n")
+    with pytest.raises(ConfigurationError, match="n_envs 6 must be a multiple of group 4"):
+        load_config("ppo", file)
 
 
 def test_arguments_go_before_the_file_and_the_file_before_the_preset(tmp_path):
@@ -92,7 +110,8 @@ def test_arguments_go_before_the_file_and_the_file_before_the_preset(tmp_path):
     config = load_config("sac", path, steps=222, seed=None)
     assert (config.steps, config.seed) == (222, 7)
     assert config.hyperparameters["batch_size"] == 16
-    assert config.hyperparameters["gamma"] == load_config("sac").hyperparameters["gamma"]
+    assert config.hyperparameters["buffer_size"] == 240
+    assert config.validation.best == load_config("sac").validation.best
     assert set(config.search) == {"hyperparameters.gamma"}
 
 

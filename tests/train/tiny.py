@@ -13,9 +13,11 @@ ALGORITHMS = ("ppo", "trpo", "recurrent-ppo", "sac", "td3", "tqc", "crossq")
 
 _COMMON: dict[str, Any] = {
     "n_envs": 4,
+    "group": 1,
     "steps": 320,
     "log_every": 100,
     "task": {
+        "preset": None,
         "observation": {"preview": 2},
         "action": {"mode": "acceleration"},
         "episode": {"library": 2, "drive_duration": 6.0, "duration": 1.0},
@@ -24,6 +26,7 @@ _COMMON: dict[str, Any] = {
     "checkpoints": {"every": 160},
     "search": {"hyperparameters.gamma": {"choices": [0.9, 0.95]}},
 }
+_NORMALIZED = {"observation": True, "reward": True}
 _NET = {"policy_kwargs": {"net_arch": [8, 8]}}
 _GRADIENT = {"net_arch": [8]}
 _ON_POLICY = {"n_steps": 16, "batch_size": 32, **_NET}
@@ -39,7 +42,8 @@ def values(algo: str, /, **fields: Any) -> dict[str, Any]:
         "recurrent-ppo": _RECURRENT,
         "apg": _GRADIENT,
     }.get(algo, _OFF_POLICY)
-    return merge({**_COMMON, "hyperparameters": hyperparameters}, fields)
+    normalize = {"normalize": _NORMALIZED} if algo in ALGORITHMS else {}
+    return merge({**_COMMON, **normalize, "hyperparameters": hyperparameters}, fields)
 
 
 def config_file(folder: Path, algo: str, /, **fields: Any) -> Path:
