@@ -49,10 +49,13 @@ FOLDERS = (
     "tests",
     "train",
 )
+_FEW = 'episode={"library": 2, "drive_duration": 22.0}'
 SMALL = {
-    "STEPS = 2_000_000": "STEPS = 16_384",
-    '"library": 128': '"library": 2',
-    '"net_arch": [128, 128]': '"net_arch": [8]',
+    "STEPS = 4_000_000": "STEPS = 2_000",
+    'gymnasium.make("motion_cueing/CueingPreview-v0")': (
+        f'gymnasium.make("motion_cueing/CueingPreview-v0", {_FEW})'
+    ),
+    'VecEnv(128, "cueing-preview", group=8)': f'VecEnv(8, "cueing-preview", group=8, {_FEW})',
 }
 """What makes the training of a tutorial a matter of seconds."""
 
@@ -113,10 +116,18 @@ def test_small_trainings_are_in_the_tutorial():
     assert [large for large in SMALL if large not in text] == []
 
 
-def test_the_first_example_scores_better_than_standing_still(folder, capsys):
-    exec("\n".join(blocks(text_of(ROOT / "README.md"), "python")), {"__name__": "page"})
+def test_the_first_example_scores_better_than_standing_still_and_the_second_keeps_an_agent(folder, capsys):
+    code = "\n".join(blocks(text_of(ROOT / "README.md"), "python"))
+    few = {"learn(4_000_000)": "learn(2_000)"} | {
+        large: few for large, few in SMALL.items() if "VecEnv" in large
+    }
+    for large, small in few.items():
+        assert large in code
+        code = code.replace(large, small)
+    exec(code, {"__name__": "page"})
     # J of no motion in the lane change is 1.7.
     assert 0.0 < float(capsys.readouterr().out) < 1.5
+    assert Path("mine.safetensors").exists()
 
 
 def test_the_import_of_the_example_finds_the_drive(folder):
