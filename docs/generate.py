@@ -192,8 +192,8 @@ def link_packages() -> None:
 
 
 def learning_tasks() -> str:
-    """The file of a task for learning."""
-    file = resources.files("motion_cueing.envs.task") / "presets" / "cueing-preview.yaml"
+    """The file of the task `cueing`."""
+    file = resources.files("motion_cueing.envs.task") / "presets" / "cueing.yaml"
     return f"```yaml\n{file.read_text(encoding='utf-8')}```"
 
 
