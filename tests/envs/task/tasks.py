@@ -32,6 +32,13 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     "jerk": {"action": ActionOptions(mode="jerk")},
     "velocity": {"action": ActionOptions(mode="velocity")},
     "residual": {"action": ActionOptions(mode="residual", authority=0.1), "base": ClassicalWashout()},
+    "commands": {
+        "action": ActionOptions(
+            mode="residual", base="linear-washout", axes=("roll", "carriage_x"), repeat=4, ramp=True
+        ),
+        "observation": ObservationOptions(scaling="typical"),
+        "reward": RewardOptions(against_base=True, standstill=0.1, floor=5.0),
+    },
     "gains": {"action": ActionOptions(mode="gains"), "base": ScheduledWashout()},
     "frozen": {"action": ActionOptions(frozen=("turntable", "carriage_x", "carriage_y"))},
     "repeat": {"action": ActionOptions(repeat=5)},
