@@ -106,15 +106,17 @@ def train(algorithm: str, task: str, seed: int, minutes: float, every: float) ->
 def table(results: dict[str, Any]) -> str:
     """The results as a table in Markdown."""
     lines = [
-        "| Task | Algorithm | Seed | Actions, k | J at the start | worst | at the end | change |",
-        "|---|---|---|---|---|---|---|---|",
+        "| Task | Algorithm | Seed | Actions, k | J at the start | lowest | highest after the start | "
+        "at the end | change |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for key, curve in sorted(results["runs"].items()):
         task, algorithm, seed = key.split("/")
         start, values = results["references"][task]["start"], [point["J"] for point in curve]
         lines.append(
             f"| `{task}` | {algorithm} | {seed} | {curve[-1]['actions'] / 1000:.0f} | {start:.2f} | "
-            f"{max(values):.2f} | {values[-1]:.2f} | {100.0 * (values[-1] / start - 1.0):+.0f} % |"
+            f"{min(values):.2f} | {max(values[1:]):.2f} | {values[-1]:.2f} | "
+            f"{100.0 * (values[-1] / start - 1.0):+.0f} % |"
         )
     return "\n".join(lines)
 
