@@ -102,8 +102,7 @@ def test_evaluate_writes_everything(simulator, cue_file, tmp_path, capsys):
 
 def test_a_maneuver_that_fails_leaves_the_others_and_exits_1(simulator, cue_file, tmp_path, capsys):
     fails, out = write_cues(tmp_path / "fails.csv"), tmp_path / "out"
-    words = ["evaluate", "--policies", "no-motion", "--out", str(out)]
-    assert main([*words, "--maneuvers", str(fails), str(cue_file)]) == 1
+    assert main(["evaluate", "--maneuvers", str(fails), str(cue_file), "--out", str(out)]) == 1
     output = capsys.readouterr()
     assert "Traceback" not in output.out + output.err
     assert "the road ends" in output.out
@@ -494,6 +493,7 @@ def test_means_say_over_how_many_drives_they_are(simulator, cue_file, tmp_path, 
     words = [
         "evaluate",
         "--policies",
+        "classical",
         "no-motion",
         "--out",
         str(tmp_path / "out"),
