@@ -45,15 +45,16 @@ types: $(DEV) $(TYPES)/motion_cueing ## mypy, strict; with Python 3.11 or newer
 	then set -x; MYPYPATH=$(TYPES) $(BIN)/mypy --namespace-packages $(PACKAGES:%=-p motion_cueing.%); \
 	else echo "Types are not checked with Python 3.10"; fi
 
+# `worksteal` leaves the tests of a file with one worker where it can: fixtures of a module are built once.
 # Workers that meet a cold cache each compile into a folder of their own; Warp keeps the first.
 unit: $(DEV) ## The tests alone
-	$(BIN)/pytest -n $(WORKERS)
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 test-fast: $(DEV) ## The tests that take no seconds each, for work in between
-	$(BIN)/pytest -n $(WORKERS) -m "not slow"
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not slow"
 
 coverage: $(DEV) ## Branch coverage by package, measured over all tests
-	$(BIN)/pytest -n $(WORKERS) --cov --cov-report=term:skip-covered
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal --cov --cov-report=term:skip-covered
 
 format: $(DEV) ## Format the code and mend what ruff can mend
 	$(BIN)/ruff check --fix .

@@ -120,12 +120,8 @@ class Search:
         return cls(path, load(TrainingConfig, path / _CONFIG))
 
     def study(self) -> optuna.Study:
-        """The study; a session does not repeat what an earlier one drew."""
-        study = self._study(optuna.load_study)
-        entropy = (self.config.seed, len(study.trials))
-        seed = int(np.random.SeedSequence(entropy).generate_state(1)[0])
-        study.sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
-        return study
+        """The study."""
+        return self._study(optuna.load_study)
 
     def _study(self, make: Callable[..., optuna.Study]) -> optuna.Study:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
@@ -213,6 +209,9 @@ class _Session:
         if self._begun:
             trial = optuna.Trial(self._study, self._begun.pop(0)._trial_id)
         else:
+            self._study.sampler = _sampler(
+                self._search.config.seed, len(self._study.get_trials(deepcopy=False))
+            )
             trial = self._study.ask()
             for name, choice in self._search.config.search.items():
                 suggest(trial, name, choice)
@@ -249,6 +248,12 @@ class _Session:
         shutil.rmtree(job.path / "checkpoints", ignore_errors=True)
         self._study.tell(number, value, TrialState.PRUNED if stopped else TrialState.COMPLETE)
         print(f"{job.name}: {'broken off' if stopped else format(value, '.4g')}", flush=True)
+
+
+def _sampler(seed: int, trial: int) -> optuna.samplers.TPESampler:
+    """What draws a trial: seeded by its number, so that a search goes on as if it had not been stopped."""
+    own = int(np.random.SeedSequence((seed, trial)).generate_state(1)[0])
+    return optuna.samplers.TPESampler(seed=own, constant_liar=True)
 
 
 def is_search(path: Path) -> bool:
