@@ -159,7 +159,7 @@ def complaint(words: list[str], capsys) -> str:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["train"], "--algorithm is missing; use one of ppo, sac, td3, tqc"),
+        (["train"], "--algorithm is missing; use one of ppo, trpo, recurrent-ppo, sac"),
         (["train", "--algorithm", "poo"], "unknown algorithm 'poo'. Did you mean ppo"),
         (["train", "--algorithm", "ppo", "--steps", "0"], "field 'steps'"),
         (["train", "--algorithm", "ppo", "--steps", "many"], "--steps takes a whole number, found 'many'"),

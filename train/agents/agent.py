@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...baselines.mpc.parameters import MpcParameters
-from ...baselines.policy import TaskPolicy, as_policy
+from ...baselines.policy import TaskPolicy
 from ...baselines.registry import make_policy
 from ...baselines.washout import ScheduledWashout, WashoutParameters
 from ...baselines.washout.classical.policies import KNOBS
@@ -56,18 +56,21 @@ def base_of(base: Any, task: TaskOptions) -> Any:
         if base is not None:
             raise ConfigurationError(f"base is of no use with task.action.mode {mode!r}; leave it out")
         return None
-    given = base or task.action.base or DEFAULT
-    if isinstance(given, str | Path):
-        made = make_policy(given, platform_of(task))
-        given = made if made.task is not None else made.parameters
-    if not isinstance(given, _parameter_sets()) and as_policy(given).task is None:
-        raise ConfigurationError(
-            f"base {base or task.action.base}: an agent's file cannot hold it; take a washout, predictive "
-            "control or an agent"
-        )
-    if mode == "gains" and not isinstance(given, WashoutParameters):
+    given = held = base or task.action.base or DEFAULT
+    if not isinstance(given, _parameter_sets()):
+        named = isinstance(given, str | Path)
+        made = make_policy(given, platform_of(task), force=not named)
+        if made.task is None:
+            held = made.parameters
+        elif named:
+            held = made
+        if made.task is None and not isinstance(held, _parameter_sets()):
+            raise ConfigurationError(
+                f"base {given}: an agent's file cannot hold it; take a washout, predictive control, an agent"
+            )
+    if mode == "gains" and not isinstance(held, WashoutParameters):
         raise ConfigurationError("task.action.mode 'gains' needs the classical washout as its base")
-    return given
+    return held
 
 
 def base_policy(base: Any, task: TaskOptions) -> Any:

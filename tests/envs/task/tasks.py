@@ -34,7 +34,7 @@ EVERY_OPTION: dict[str, dict[str, Any]] = {
     "residual": {"action": ActionOptions(mode="residual", authority=0.1), "base": ClassicalWashout()},
     "commands": {
         "action": ActionOptions(
-            mode="residual", base="linear-washout", axes=("roll", "carriage_x"), repeat=4, ramp=True
+            mode="residual", base="classical", axes=("roll", "carriage_x"), repeat=4, ramp=True
         ),
         "observation": ObservationOptions(scaling="typical"),
         "reward": RewardOptions(against_base=True, standstill=0.1, floor=5.0),

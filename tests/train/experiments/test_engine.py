@@ -269,5 +269,5 @@ def test_a_single_training_runs_on_ray(ray, config, undisturbed, tmp_path, monke
     assert studies.run_training(folder, studies.Place("ray")) == 0
     told = capsys.readouterr()
     assert f"final.safetensors: the agent after {config.steps:,} steps" in told.out
-    assert told.err.count(" steps  J ") == 3
+    assert told.err.count("(washout ") == 3
     assert_same([TrainingJob("one", folder.path, config)], undisturbed[:1])
