@@ -68,16 +68,18 @@ class Batch:
         if n < 1:
             raise ConfigurationError(f"a batch needs at least one environment, found {n}")
         self.n, self.options = n, options
+        machines = machines_of(options) if platforms is None else platforms
+        # Refused before the drives are made, which takes seconds.
+        policy = base_of(base, options, machines[0])
         self.drives = self._library(drives)
         self.simulator = Simulator(
-            machines_of(options) if platforms is None else platforms,
+            machines,
             self.drives,
             drive_of=np.zeros(n, dtype=np.int32),
             vestibular=get_vestibular_model(options.vestibular),
             device=device,
         )
         self.platform = self.simulator.platforms[0]
-        policy = base_of(base, options, self.platform)
         self.action_size = gains_of(policy) if options.action.mode == "gains" else options.action.size
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
         memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
