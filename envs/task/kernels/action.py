@@ -65,6 +65,10 @@ class ActionOptions:
         check_names("axis", (*self.frozen, *self.axes), AXES)
         if len(set(self.axes)) < len(self.axes):
             raise ValueError(f"axes must differ, found {', '.join(self.axes)}")
+        if self.base is not None and self.mode not in ("residual", "gains"):
+            raise ValueError(f"base {self.base!r} is of no use with mode {self.mode!r}; set it to None")
+        if self.mode == "gains" and self.bound != 1.0:
+            raise ValueError(f"bound must be 1 with mode 'gains', found {self.bound:g}")
 
     @property
     def size(self) -> int:

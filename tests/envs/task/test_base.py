@@ -188,6 +188,11 @@ def test_rewards_are_divided_by_what_standing_still_costs_and_have_a_floor():
         ({"action": {"axes": ["carriage_x", "carriage_x"]}}, "axes must differ"),
         ({"action": {"axes": ["carriage_z"]}}, "unknown axis 'carriage_z'"),
         ({"action": {"bound": 0.0}}, "action.bound"),
+        (
+            {"action": {"mode": "gains", "base": "classical", "bound": 2.0}},
+            "bound must be 1 with mode 'gains'",
+        ),
+        ({"action": {"base": "classical"}}, "base 'classical' is of no use with mode 'acceleration'"),
         ({"reward": {"against_base": True}}, "needs a base policy"),
         ({"reward": {"floor": 0.0}}, "reward.floor"),
     ],

@@ -1,4 +1,4 @@
-"""Configurations that hardly learn are told before they are trained."""
+"""Warnings before a training whose configuration will hardly learn."""
 
 from __future__ import annotations
 
