@@ -17,7 +17,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
@@ -79,10 +78,9 @@ class Validator(BaseCallback):
 def references(task: str) -> dict[str, float]:
     """J of the washout and of the controller that a training begins with, on the validation drives."""
     validation = Validation(_config("ppo", task, 0))
-    action = np.zeros((DRIVES.drives, load_task(task).action.size), dtype=np.float32)
     return {
         "classical": validation.score_policy(ClassicalWashout()).cue_error,
-        "start": validation.score(lambda _: action).cue_error,
+        "start": validation.score_base().cue_error,
     }
 
 

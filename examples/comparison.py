@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from motion_cueing.envs.task.options import load_task
 from motion_cueing.train.agents import Agent, Network, Record
 from motion_cueing.train.config import TrainingConfig, ValidationOptions
@@ -49,9 +47,8 @@ def save_and_compare(network: Network, steps: int, args: Args) -> None:
     agent = Agent(args.out.stem, TASK, network, Record(algo="ppo", seed=args.seed, steps=steps))
     agent.save(args.out)
     unseen = Validation(TrainingConfig("ppo", task=TASK, validation=ValidationOptions(drives=args.drives)))
-    zero = np.zeros((args.drives, agent.action_size), dtype=np.float32)
     scores = {
-        str(TASK.action.base): unseen.score(lambda _: zero),
+        str(TASK.action.base): unseen.score_base(),
         agent.name: unseen.score(network),
     }
     for name, score in scores.items():
