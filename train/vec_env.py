@@ -168,17 +168,18 @@ class DrivingSimulatorVecEnv(VecEnv):
             for i in np.flatnonzero(ended).tolist():
                 infos[i] = self._final_info(i, bool(truncated[i] and not terminated[i]))
             self._begin(ended)
-        return arrays.observation.pull().copy(), self._relative(reward), ended, infos
+        if self.group > 1:
+            grouped = reward.reshape(-1, self.group)
+            mean = grouped.mean(axis=1)
+            self._groups += [len(mean), mean.sum(), np.square(mean).sum(), grouped.var(axis=1, ddof=1).sum()]
+            reward = self.relative(reward)
+        return arrays.observation.pull().copy(), reward, ended, infos
 
-    def _relative(self, reward: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Rewards (n,) less the mean of the others in the group."""
-        if self.group == 1:
-            return reward
-        grouped = reward.reshape(-1, self.group)
-        mean = grouped.mean(axis=1, keepdims=True)
-        self._groups += [len(mean), mean.sum(), np.square(mean).sum(), grouped.var(axis=1, ddof=1).sum()]
-        own = grouped - mean
-        return np.asarray(own * (self.group / (self.group - 1.0)), dtype=np.float32).reshape(-1)
+    def relative(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values (n, ...), a row an environment, less the mean of the others in the group."""
+        grouped = values.reshape(-1, self.group, *values.shape[1:])
+        own = grouped - grouped.mean(axis=1, keepdims=True)
+        return np.asarray(own * (self.group / (self.group - 1.0)), dtype=np.float32).reshape(values.shape)
 
     def take_drive_share(self) -> float | None:
         """Share of the variance of rewards that a group has in common since the last call, and begin anew.

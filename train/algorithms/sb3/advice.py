@@ -45,7 +45,8 @@ def _saturation(config: TrainingConfig, algorithm: type[BaseAlgorithm]) -> str |
     if not issubclass(algorithm, OnPolicyAlgorithm) or given.get("use_sde"):
         return None
     kwargs: Any = given.get("policy_kwargs") or {}
-    deviation = math.exp(float(kwargs.get("log_std_init", 0.0)))
+    annealed: Any = given.get("annealed_std")
+    deviation = math.exp(float(kwargs.get("log_std_init", 0.0))) if annealed is None else float(annealed[0])
     bound = config.task.action.bound
     beyond = math.erfc(bound / deviation / math.sqrt(2.0))
     if deviation <= bound:

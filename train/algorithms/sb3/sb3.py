@@ -21,9 +21,11 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ....envs.errors import ConfigurationError, suggest
+from ....envs.settings import Positive
 from ...agents import PolicyNetwork
 from ...agents.agent import base_policy
 from ...config import TrainingConfig
@@ -34,6 +36,8 @@ from ...training import initial_network
 from ...validation import Act
 from ...vec_env import DrivingSimulatorVecEnv
 from .advice import advice
+from .callbacks import AdaptiveLearningRate, AnnealedNoise
+from .group_critic import Deviations, GroupCriticPolicy
 from .policy import CLASSES, SkipPolicy, load_network, network_of
 from .state import exploring, restore, restore_random, state_of
 
@@ -47,6 +51,7 @@ NOISES: Final[Mapping[str, Any]] = {
 """Names that ``noise_type`` takes."""
 
 _NOISE: Final = ("noise_type", "noise_std")
+_CALLBACKS: Final = ("annealed_std", "adaptive_kl")
 _POLICY: Final = "policy"
 OURS: Final = {
     "self", "policy", "env", "verbose", "seed", "device", "tensorboard_log", "stats_window_size",
@@ -71,8 +76,10 @@ def arguments(
         algorithm: Its class.
         hyperparameters: As in rl-baselines3-zoo: numbers may be schedules (``lin_3e-4``); ``policy_kwargs``
             is a mapping, its ``activation_fn`` one of :data:`TORCH_ACTIVATIONS`. ``policy`` is "MlpPolicy"
-            ("MlpLstmPolicy" for RecurrentPPO) or, for PPO and TRPO, "SkipPolicy", with a skip connection.
-            ``noise_type`` and ``noise_std`` make the action noise.
+            ("MlpLstmPolicy" for RecurrentPPO) or, for PPO and TRPO, "SkipPolicy", with a skip connection,
+            or "GroupCriticPolicy".
+            ``noise_type`` and ``noise_std`` make the action noise. On policy, ``annealed_std`` and
+            ``adaptive_kl`` are the arguments of :mod:`.callbacks`; see :func:`callbacks_of`.
         action_size: Entries of an action.
 
     Raises:
@@ -80,8 +87,10 @@ def arguments(
     """
     known = parameters(algorithm, OURS)
     noisy = "action_noise" in inspect.signature(algorithm).parameters
-    _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *(_NOISE if noisy else ())])
-    given = {name: v for name, v in hyperparameters.items() if name not in (*_NOISE, _POLICY)}
+    own = [*(_NOISE if noisy else ()), *(_CALLBACKS if issubclass(algorithm, OnPolicyAlgorithm) else ())]
+    _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *own])
+    callbacks_of(hyperparameters)
+    given = {n: v for n, v in hyperparameters.items() if n not in (*_NOISE, *_CALLBACKS, _POLICY)}
     given["policy_kwargs"] = _policy_kwargs(algorithm, given.get("policy_kwargs") or {})
     checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in given.items()}
     checked[_POLICY] = _policy(
@@ -99,7 +108,9 @@ def _plain(algorithm: type[BaseAlgorithm]) -> str:
 
 def _policy(algorithm: type[BaseAlgorithm], name: Any, use_sde: bool) -> Any:
     plain = _plain(algorithm)
-    known = {plain: plain} | ({"SkipPolicy": SkipPolicy} if algorithm in (PPO, TRPO) else {})
+    known: dict[str, Any] = {plain: plain}
+    if algorithm in (PPO, TRPO):
+        known |= {"SkipPolicy": SkipPolicy, "GroupCriticPolicy": GroupCriticPolicy}
     if name not in known:
         raise ConfigurationError(f"hyperparameters.policy: {name!r}; use one of {', '.join(known)}")
     if known[name] is SkipPolicy and use_sde:
@@ -158,6 +169,32 @@ def _checked(where: str, value: Any, hint: Any) -> Any:
         raise ConfigurationError(f"{where}: {reasons} (found {value!r})") from None
 
 
+def callbacks_of(hyperparameters: Mapping[str, Any]) -> list[BaseCallback]:
+    """What acts on the model between its updates.
+
+    Args:
+        hyperparameters: ``annealed_std``, the standard deviation of the actions at first and at the end;
+            ``adaptive_kl``, the divergence of an update that the learning rate is to keep.
+
+    Raises:
+        ConfigurationError: one is not of positive numbers.
+    """
+    found: list[BaseCallback] = []
+    kl, rate = hyperparameters.get("adaptive_kl"), hyperparameters.get("learning_rate", 1e-3)
+    if kl is not None:
+        if str(rate).startswith(SCHEDULED):
+            raise ConfigurationError(
+                f"hyperparameters.learning_rate must be a number with adaptive_kl, found {rate}"
+            )
+        found.append(AdaptiveLearningRate(_checked("hyperparameters.adaptive_kl", kl, Positive), float(rate)))
+    deviations = hyperparameters.get("annealed_std")
+    if deviations is not None:
+        found.append(
+            AnnealedNoise(*_checked("hyperparameters.annealed_std", deviations, tuple[Positive, Positive]))
+        )
+    return found
+
+
 def linear(initial: float) -> Callable[[float], float]:
     """A schedule from ``initial`` to zero; its argument goes from 1 at the beginning to 0 at the end."""
     return lambda remaining: remaining * initial
@@ -184,7 +221,8 @@ class SB3Learner(Learner):
         torch.set_num_threads(config.threads)
         algorithm, self._total = CLASSES[config.algo], config.steps
         # Checked before the drives are made, which takes seconds.
-        arguments(algorithm, config.hyperparameters, 1)
+        if arguments(algorithm, config.hyperparameters, 1)[_POLICY] is GroupCriticPolicy:
+            _check_groups(config)
         base = base_policy(config.base, config.task)
         self.simulators = DrivingSimulatorVecEnv(
             config.n_envs,
@@ -194,14 +232,18 @@ class SB3Learner(Learner):
             stagger=config.group > 1,
             device=config.device,
         )
-        self.normalize = _normalized(self.simulators, config)
-        env: VecEnv = self.normalize or self.simulators
         (size,) = self.simulators.action_space.shape or (0,)
         hyperparameters = arguments(algorithm, config.hyperparameters, size)
+        env: VecEnv = self.simulators
+        if hyperparameters[_POLICY] is GroupCriticPolicy:
+            env = Deviations(self.simulators)
+        self.normalize = _normalized(env, config)
+        env = self.normalize or env
         self.model = _model(algorithm, env, config, hyperparameters)
         initial = initial_network(config)
         if initial is not None:
             load_network(initial, self.model, self.normalize, _INITIAL_WEIGHT)
+        self.callbacks = callbacks_of(config.hyperparameters)
         self.model.set_logger(Logger(None, output_formats=[]))
         self.monitor = Monitor()
         self._resumed: State | None = None
@@ -216,7 +258,7 @@ class SB3Learner(Learner):
         left = self._total - self.steps
         if left <= 0:
             return
-        callback = _Callback(self._at(boundary), self.monitor, self.simulators)
+        callback = [*self.callbacks, _Callback(self._at(boundary), self.monitor, self.simulators)]
         # No Generic method: the classes' own differ in the default of log_interval alone.
         learn: Any = self.model.learn
         learn(left, callback=callback, log_interval=None, reset_num_timesteps=False)
@@ -261,7 +303,8 @@ class SB3Learner(Learner):
     def state(self) -> dict[str, Any]:
         """Weights, optimizers, replay buffer, normalization, environments, random generators, log."""
         whole = state_of(self.model, self.simulators, self.normalize)
-        return {**whole, "monitor": self.monitor.state(), "told": self._logged()}
+        rates = [one.rate for one in self.callbacks if isinstance(one, AdaptiveLearningRate)]
+        return {**whole, "monitor": self.monitor.state(), "told": self._logged(), "rates": rates}
 
     def restore(self, state: State) -> None:
         """Go on from a state."""
@@ -269,6 +312,9 @@ class SB3Learner(Learner):
         self._resumed = {name: state[name] for name in ("random", "noise", "walks")}
         self.monitor.restore(state["monitor"])
         self.model.logger.name_to_value.update(state["told"])
+        adaptive = [one for one in self.callbacks if isinstance(one, AdaptiveLearningRate)]
+        for callback, rate in zip(adaptive, state.get("rates", []), strict=True):
+            callback.rate = rate
 
 
 def _model(
@@ -281,7 +327,17 @@ def _model(
         raise ConfigurationError(f"hyperparameters: {' '.join(str(error).split())}") from None
 
 
-def _normalized(env: DrivingSimulatorVecEnv, config: TrainingConfig) -> VecNormalize | None:
+def _check_groups(config: TrainingConfig) -> None:
+    if config.group < 2:
+        raise ConfigurationError("hyperparameters.policy GroupCriticPolicy needs groups: set group to 8")
+    if config.normalize.observation:
+        raise ConfigurationError(
+            "normalize.observation must be off with hyperparameters.policy GroupCriticPolicy; "
+            "set task.observation.scaling to typical"
+        )
+
+
+def _normalized(env: VecEnv, config: TrainingConfig) -> VecNormalize | None:
     options = config.normalize
     if not (options.observation or options.reward):
         return None

@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from ...registry import State, restoring
 from ...vec_env import DrivingSimulatorVecEnv
+from .group_critic import GroupCriticPolicy
 
 _PLAIN: Final = ("num_timesteps", "_n_updates", "_episode_num")
 _NOISE: Final = ("exploration_mat", "exploration_matrices")
@@ -79,6 +80,9 @@ def exploring(
     def act(observation: NDArray[np.float32]) -> NDArray[np.float32]:
         nonlocal memory
         seen: Any = observation if normalize is None else normalize.normalize_obs(observation)
+        if isinstance(policy, GroupCriticPolicy):
+            # One by itself deviates from none, and the actor does not see it.
+            seen = np.hstack([seen, np.zeros_like(seen)])
         action, memory = model.predict(seen, memory, begins, deterministic=False)
         begins[...] = False
         if noise is None:

@@ -1,0 +1,84 @@
+"""A critic that knows how a machine differs from the others in its group; for PPO and TRPO.
+
+In a group the reward is relative to the others', so the road tells nothing about what is still to come: where
+this machine is, and the others are not, does. The critic sees that beside the observation, and the actor the
+observation alone, which is all there is where it is used (an asymmetric critic).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import MlpExtractor
+from stable_baselines3.common.vec_env import VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+from ....envs.errors import ConfigurationError
+from ...vec_env import DrivingSimulatorVecEnv
+
+_UNIT: Final = 0.25
+"""Deviation that is shown as 1: those within a group are smaller than what is usual on the road."""
+
+
+class Deviations(VecEnvWrapper):
+    """Each observation, and after it how it differs from the mean of the others in the group.
+
+    Args:
+        venv: The machines, in groups.
+
+    Raises:
+        ConfigurationError: they are in no groups.
+    """
+
+    def __init__(self, venv: DrivingSimulatorVecEnv) -> None:
+        if venv.group < 2:
+            raise ConfigurationError(
+                f"deviations are from others in a group; group must be above 1, found {venv.group}"
+            )
+        self.simulators = venv
+        seen: Any = venv.observation_space
+        self._largest = np.tile(seen.high, 2)
+        super().__init__(venv, observation_space=spaces.Box(-self._largest, self._largest, dtype=np.float32))
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin new episodes."""
+        return self._with_deviations(self.simulators.reset())
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Play the actions; ``terminal_observation`` has the deviations at the end, too."""
+        observation, reward, ended, infos = self.simulators.step_wait()
+        if ended.any():
+            last = observation.copy()
+            for i in np.flatnonzero(ended):
+                last[i] = infos[i]["terminal_observation"]
+            last = self._with_deviations(last)
+            for i in np.flatnonzero(ended):
+                infos[i]["terminal_observation"] = last[i]
+        return self._with_deviations(observation), reward, ended, infos
+
+    def _with_deviations(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        deviation = self.simulators.relative(observation) / _UNIT
+        return np.clip(np.hstack([observation, deviation]), -self._largest, self._largest)
+
+
+class _ActorSeesHalf(MlpExtractor):
+    """Hidden layers of a critic that sees everything, and of an actor that sees the first half."""
+
+    def __init__(self, size: int, net_arch: Any, activation_fn: Any, device: Any) -> None:
+        super().__init__(size, net_arch, activation_fn, device)
+        self._seen = size // 2
+        self.policy_net = MlpExtractor(self._seen, net_arch, activation_fn, device).policy_net
+
+    def forward_actor(self, features: Any) -> Any:
+        return super().forward_actor(features[:, : self._seen])
+
+
+class GroupCriticPolicy(ActorCriticPolicy):
+    """``MlpPolicy`` for :class:`Deviations`, with its arguments: the critic sees them, the actor does not."""
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor = _ActorSeesHalf(self.features_dim, self.net_arch, self.activation_fn, self.device)
