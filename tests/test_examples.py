@@ -68,6 +68,7 @@ def test_a_trained_agent_is_held_against_its_washout(name, unseen, tmp_path):
         "--steps=128",
         "--num-envs=8",
         "--rollout=16",
+        "--library=2",
         "--drives=2",
         "--seed=3",
         "--out=mine.safetensors",
@@ -81,7 +82,7 @@ def test_a_trained_agent_is_held_against_its_washout(name, unseen, tmp_path):
         errors = [measure(rollout(policy, cues)).cue_error for cues in unseen]
         # The batch scores where actions end, a rollout everywhere; three decimals are printed.
         assert found[policy.name] == pytest.approx(np.mean(errors), rel=2e-3)
-    assert agent.task == load_task("cueing-preview")
+    assert agent.task == load_task("cueing-preview", episode={"library": 2})
     assert (agent.record.steps, agent.record.seed) == (128, 3)
 
 
@@ -180,10 +181,9 @@ def test_torchrl_values_the_last_observation_of_an_episode_and_begins_the_next(e
 
     task = load_task("cueing-preview", episode={"library": 2, "drive_duration": 8.0, "duration": 0.32})
     torchrl = example("train_with_torchrl")
-    torchrl.TASK = task
-    env = torchrl.Cueing(2, seed=5)
+    env = torchrl.Cueing(2, task, seed=5)
     check_env_specs(env)
-    env = torchrl.Cueing(2, seed=5)
+    env = torchrl.Cueing(2, task, seed=5)
     actions = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (6, 2, 4)).astype(np.float32))
     batch = DrivingSimulatorVector(2, task, autoreset_mode="SameStep")
     observation, _ = batch.reset(seed=5)

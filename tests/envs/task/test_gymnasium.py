@@ -71,12 +71,16 @@ def test_gymnasiums_wrappers_of_batches_accept_it():
     assert list(info["episode"]["l"]) == [40, 40]
 
 
+DRAWN = ("defaults", "builds", "dim hexapod", "24-inch", "nads-1")
+"""Options that a picture depends on: those of the machine."""
+
+
 @pytest.mark.parametrize("name", EVERY_OPTION)
 def test_gymnasiums_checker_finds_nothing_to_warn_of(name):
     env = gymnasium.make(ID, **options(name)).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(env)
+        check_env(env, skip_render_check=name not in DRAWN)
 
 
 @pytest.mark.parametrize("name", EVERY_OPTION)
