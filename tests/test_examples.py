@@ -86,16 +86,27 @@ def test_a_trained_agent_is_held_against_its_washout(name, unseen, tmp_path):
     assert (agent.record.steps, agent.record.seed) == (128, 3)
 
 
-def test_policies_are_compared_best_first(tmp_path):
-    lines = lines_of(PLACE / "compare_policies.py", tmp_path, "braking")
+@pytest.fixture
+def example(monkeypatch):
+    """Loads an example as a module."""
+    monkeypatch.syspath_prepend(PLACE)
+    yield importlib.import_module
+    for path in PLACE.glob("*.py"):
+        sys.modules.pop(path.stem, None)
+
+
+def test_policies_are_compared_best_first(example, capsys):
+    example("compare_policies").main("braking")
+    lines = capsys.readouterr().out.splitlines()
     table = {line.split()[0]: float(line.split()[-1]) for line in lines if " J = " in line}
     assert set(table) == {"no-motion", "classical", "carriage-on-springs"}
     assert list(table.values()) == sorted(table.values())
     assert table["classical"] < table["no-motion"]
 
 
-def test_a_controller_of_ones_own_beats_standing_still(tmp_path):
-    lines = lines_of(PLACE / "own_controller.py", tmp_path, "braking")
+def test_a_controller_of_ones_own_beats_standing_still(example, capsys):
+    example("own_controller").main("braking")
+    lines = capsys.readouterr().out.splitlines()
     assert lines[0].split()[:3] == ["maneuver", "policy", "J"]
     rows = [line.split() for line in lines[1:]]
     found = {policy: (float(error), float(sensed)) for _, policy, error, sensed, *_ in rows}
@@ -103,15 +114,6 @@ def test_a_controller_of_ones_own_beats_standing_still(tmp_path):
     assert found["tilt-and-shove"] < found["no-motion"]
     assert found["tilt-and-shove"][1] < found["no-motion"][1]
     assert found["no-motion"][0] == pytest.approx(7.41, abs=0.02)
-
-
-@pytest.fixture
-def example(monkeypatch):
-    """Loads an example as a module."""
-    monkeypatch.syspath_prepend(PLACE)
-    yield importlib.import_module
-    for name in (*TRAININGS, SHARED):
-        sys.modules.pop(name, None)
 
 
 @pytest.fixture

@@ -34,7 +34,8 @@ PROGRAM = (sys.executable, "-m", "motion_cueing.evaluation")
 @pytest.mark.parametrize("algo", tiny.ALGORITHMS)
 def test_an_agent_comes_of_it(algo, tmp_path, capsys):
     out = tmp_path / "run"
-    words = ["train", "--algorithm", algo, "--config", str(tiny.config_file(tmp_path, algo))]
+    config_file = tiny.config_file(tmp_path, algo, hyperparameters={"gamma": 0.95})
+    words = ["train", "--algorithm", algo, "--config", str(config_file)]
     assert main([*words, "--seed", "3", "--envs", "5", "--out", str(out)]) == 0
     told = capsys.readouterr()
     assert "final.safetensors: the agent after" in told.out
@@ -212,7 +213,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
         "broken": "a: 1\nb: [",
         "typo": "hyperparameters: {n_step: 3}",
         "drive": "task: {episode: {drives: [braking]}}",
-        "together": "hyperparameters: {train_freq: [1, year]}",
+        "together": "hyperparameters: {train_freq: [1, year]}\ntask: {episode: {library: 1}}",
         "nothing": "search: {}",
         "shape": "search: {hyperparameters.policy_kwargs.net_arch: {choices: [[4], [5]]}}",
         "reward": "search: {task.reward.tilt_rate: {low: 0.1, high: 1.0}}\nvalidation: {best: reward}",
