@@ -32,6 +32,7 @@ PROGRAM = (sys.executable, "-m", "motion_cueing.evaluation")
 
 
 @pytest.mark.parametrize("algo", tiny.ALGORITHMS)
+@pytest.mark.usefixtures("undrawn")
 def test_an_agent_comes_of_it(algo, tmp_path, capsys):
     out = tmp_path / "run"
     config_file = tiny.config_file(tmp_path, algo, hyperparameters={"gamma": 0.95})
@@ -73,6 +74,7 @@ def test_an_agent_is_evaluated(tmp_path, capsys):
     assert "lane-change" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     out = tmp_path / "run"
     path = tiny.config_file(tmp_path, "ppo", steps=10_000_000)
@@ -99,6 +101,7 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     assert Agent.load(out / "final.safetensors").record.steps >= steps + 64
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_same_command_goes_on_and_fresh_begins_anew(tmp_path, capsys):
     out, config = tmp_path / "run", tiny.config_file(tmp_path, "ppo", steps=64)
     words = ["train", "--algorithm", "ppo", "--config", str(config), "--out", str(out)]
@@ -138,6 +141,7 @@ def test_ctrl_c_twice_interrupts_at_once():
     assert signal.getsignal(signal.SIGINT) is earlier
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_other_versions_at_resuming_are_told(tmp_path, capsys):
     folder = RunFolder.create(tmp_path / "run", tiny.config(tmp_path, "ppo", steps=64))
     Training(folder).train()
