@@ -146,7 +146,10 @@ def train(args: Args) -> tuple[ActorCritic, int]:
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
     envs = gymnasium.make_vec(
-        "motion_cueing/CueingPreview-v0", num_envs=args.num_envs, autoreset_mode="SameStep"
+        "motion_cueing/CueingPreview-v0",
+        num_envs=args.num_envs,
+        autoreset_mode="SameStep",
+        episode={"library": args.library},
     )
     (size,), (action_size,) = envs.single_observation_space.shape, envs.single_action_space.shape
     agent = ActorCritic(size, action_size)

@@ -6,10 +6,10 @@ needs none of them, for ``motion-cueing evaluate`` and every other command.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from motion_cueing.envs.task.options import load_task
+from motion_cueing.envs.task.options import TaskOptions, load_task
 from motion_cueing.train.agents import Agent, Network, Record
 from motion_cueing.train.config import TrainingConfig, ValidationOptions
 from motion_cueing.train.validation import Validation
@@ -28,12 +28,19 @@ class Args:
     """Environments in the batch."""
     rollout: int = 2048
     """Actions of each environment between two updates."""
+    library: int = TASK.episode.library
+    """Random drives, of one minute each, to train on."""
     seed: int = 0
     """Of weights, noise and drives."""
     out: Path = Path("agent.safetensors")
     """File of the agent."""
     drives: int = 16
     """Unseen random drives, of one minute each, in the comparison."""
+
+    @property
+    def task(self) -> TaskOptions:
+        """The task, with the drives asked for."""
+        return replace(TASK, episode=replace(TASK.episode, library=self.library))
 
 
 def save_and_compare(network: Network, steps: int, args: Args) -> None:
@@ -44,11 +51,12 @@ def save_and_compare(network: Network, steps: int, args: Args) -> None:
         steps: Actions taken in training, over all environments.
         args: Of the example.
     """
-    agent = Agent(args.out.stem, TASK, network, Record(algo="ppo", seed=args.seed, steps=steps))
+    task = args.task
+    agent = Agent(args.out.stem, task, network, Record(algo="ppo", seed=args.seed, steps=steps))
     agent.save(args.out)
-    unseen = Validation(TrainingConfig("ppo", task=TASK, validation=ValidationOptions(drives=args.drives)))
+    unseen = Validation(TrainingConfig("ppo", task=task, validation=ValidationOptions(drives=args.drives)))
     scores = {
-        str(TASK.action.base): unseen.score_base(),
+        str(task.action.base): unseen.score_base(),
         agent.name: unseen.score(network),
     }
     for name, score in scores.items():

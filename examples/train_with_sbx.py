@@ -37,7 +37,7 @@ def network_of(model: PPO) -> Network:
 
 def main(args: Args) -> None:
     """Train, save, and print J of the agent and of its washout."""
-    envs = DrivingSimulatorVecEnv(args.num_envs, comparison.TASK, group=args.group)
+    envs = DrivingSimulatorVecEnv(args.num_envs, args.task, group=args.group)
     # With ortho_init the mean action begins near zero, as in Stable-Baselines3: with the washout alone.
     model = PPO("MlpPolicy", envs, n_steps=args.rollout, seed=args.seed, policy_kwargs={"ortho_init": True})
     model.learn(args.steps)

@@ -64,7 +64,9 @@ def main(args: Args) -> None:
     set_seed(args.seed)
     # Gymnasium's own way of beginning anew, in the step after the last, keeps the last observation: skrl
     # needs its value where an episode is cut off.
-    batch = gymnasium.make_vec("motion_cueing/CueingPreview-v0", num_envs=args.num_envs)
+    batch = gymnasium.make_vec(
+        "motion_cueing/CueingPreview-v0", num_envs=args.num_envs, episode={"library": args.library}
+    )
     env: Any = wrap_env(batch, wrapper="gymnasium", verbose=False)
     spaces = {
         "observation_space": env.observation_space,

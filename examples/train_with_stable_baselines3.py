@@ -36,7 +36,7 @@ class Args(comparison.Args):
 def main(args: Args) -> None:
     """Train, save, and print J of the agent and of its washout."""
     torch.set_num_threads(1)
-    envs = DrivingSimulatorVecEnv(args.num_envs, comparison.TASK, group=args.group)
+    envs = DrivingSimulatorVecEnv(args.num_envs, args.task, group=args.group)
     model = PPO(
         "MlpPolicy",
         envs,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import torch
 import tyro
-from comparison import TASK, Args, save_and_compare
+from comparison import Args, save_and_compare
 from tensordict import TensorDict
 from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
 from torch import nn
@@ -20,6 +20,7 @@ from torchrl.modules import IndependentNormal, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value import GAE
 
+from motion_cueing.envs.task import TaskOptions
 from motion_cueing.train.agents import Network
 from motion_cueing.train.networks import linear_layers, weights_of
 from motion_cueing.train.torch_env import DrivingSimulatorTorch
@@ -28,9 +29,9 @@ from motion_cueing.train.torch_env import DrivingSimulatorTorch
 class Cueing(EnvBase):
     """The batch; an ended environment has begun anew before TorchRL asks for it."""
 
-    def __init__(self, num_envs: int, seed: int) -> None:
+    def __init__(self, num_envs: int, task: TaskOptions, seed: int) -> None:
         super().__init__(device="cpu", batch_size=[num_envs])
-        self.simulators = DrivingSimulatorTorch(num_envs, TASK, device="cpu")
+        self.simulators = DrivingSimulatorTorch(num_envs, task, device="cpu")
         self.set_seed(seed)
         self.now = self.simulators.reset(seed)
         self.observation_spec = Composite(observation=Unbounded(self.now.shape), shape=[num_envs])
@@ -72,7 +73,7 @@ def main(args: Args) -> None:
     """Train, save, and print J of the agent and of its washout."""
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
-    env = Cueing(args.num_envs, args.seed)
+    env = Cueing(args.num_envs, args.task, args.seed)
     size, action_size = env.observation_spec["observation"].shape[-1], env.action_spec.shape[-1]
     mean = layers(size, action_size)
     # The mean action begins at zero: with the washout alone.

@@ -14,5 +14,7 @@ def package_files() -> list[Path]:
     return sorted(
         path.relative_to(ROOT)
         for path in found
-        if path.is_file() and path.suffix != ".pyc" and not any(p.startswith(".") for p in path.parts[-2:])
+        if path.is_file()
+        and "__pycache__" not in path.parts
+        and not any(p.startswith(".") for p in path.parts[-2:])
     )

@@ -68,6 +68,7 @@ def test_a_trained_agent_is_held_against_its_washout(name, unseen, tmp_path):
         "--steps=128",
         "--num-envs=8",
         "--rollout=16",
+        "--library=2",
         "--drives=2",
         "--seed=3",
         "--out=mine.safetensors",
@@ -81,27 +82,8 @@ def test_a_trained_agent_is_held_against_its_washout(name, unseen, tmp_path):
         errors = [measure(rollout(policy, cues)).cue_error for cues in unseen]
         # The batch scores where actions end, a rollout everywhere; three decimals are printed.
         assert found[policy.name] == pytest.approx(np.mean(errors), rel=2e-3)
-    assert agent.task == load_task("cueing-preview")
+    assert agent.task == load_task("cueing-preview", episode={"library": 2})
     assert (agent.record.steps, agent.record.seed) == (128, 3)
-
-
-def test_policies_are_compared_best_first(tmp_path):
-    lines = lines_of(PLACE / "compare_policies.py", tmp_path, "braking")
-    table = {line.split()[0]: float(line.split()[-1]) for line in lines if " J = " in line}
-    assert set(table) == {"no-motion", "classical", "carriage-on-springs"}
-    assert list(table.values()) == sorted(table.values())
-    assert table["classical"] < table["no-motion"]
-
-
-def test_a_controller_of_ones_own_beats_standing_still(tmp_path):
-    lines = lines_of(PLACE / "own_controller.py", tmp_path, "braking")
-    assert lines[0].split()[:3] == ["maneuver", "policy", "J"]
-    rows = [line.split() for line in lines[1:]]
-    found = {policy: (float(error), float(sensed)) for _, policy, error, sensed, *_ in rows}
-    assert set(found) == {"no-motion", "classical", "tilt-and-shove"}
-    assert found["tilt-and-shove"] < found["no-motion"]
-    assert found["tilt-and-shove"][1] < found["no-motion"][1]
-    assert found["no-motion"][0] == pytest.approx(7.41, abs=0.02)
 
 
 @pytest.fixture
@@ -109,8 +91,29 @@ def example(monkeypatch):
     """Loads an example as a module."""
     monkeypatch.syspath_prepend(PLACE)
     yield importlib.import_module
-    for name in (*TRAININGS, SHARED):
-        sys.modules.pop(name, None)
+    for path in PLACE.glob("*.py"):
+        sys.modules.pop(path.stem, None)
+
+
+def test_policies_are_compared_best_first(example, capsys):
+    example("compare_policies").main("braking")
+    lines = capsys.readouterr().out.splitlines()
+    table = {line.split()[0]: float(line.split()[-1]) for line in lines if " J = " in line}
+    assert set(table) == {"no-motion", "classical", "carriage-on-springs"}
+    assert list(table.values()) == sorted(table.values())
+    assert table["classical"] < table["no-motion"]
+
+
+def test_a_controller_of_ones_own_beats_standing_still(example, capsys):
+    example("own_controller").main("braking")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split()[:3] == ["maneuver", "policy", "J"]
+    rows = [line.split() for line in lines[1:]]
+    found = {policy: (float(error), float(sensed)) for _, policy, error, sensed, *_ in rows}
+    assert set(found) == {"no-motion", "classical", "tilt-and-shove"}
+    assert found["tilt-and-shove"] < found["no-motion"]
+    assert found["tilt-and-shove"][1] < found["no-motion"][1]
+    assert found["no-motion"][0] == pytest.approx(7.41, abs=0.02)
 
 
 @pytest.fixture
@@ -180,10 +183,9 @@ def test_torchrl_values_the_last_observation_of_an_episode_and_begins_the_next(e
 
     task = load_task("cueing-preview", episode={"library": 2, "drive_duration": 8.0, "duration": 0.32})
     torchrl = example("train_with_torchrl")
-    torchrl.TASK = task
-    env = torchrl.Cueing(2, seed=5)
+    env = torchrl.Cueing(2, task, seed=5)
     check_env_specs(env)
-    env = torchrl.Cueing(2, seed=5)
+    env = torchrl.Cueing(2, task, seed=5)
     actions = torch.from_numpy(np.random.default_rng(0).uniform(-1, 1, (6, 2, 4)).astype(np.float32))
     batch = DrivingSimulatorVector(2, task, autoreset_mode="SameStep")
     observation, _ = batch.reset(seed=5)

@@ -49,11 +49,11 @@ def wheel(tmp_path_factory) -> Path:
 def installed(wheel, tmp_path_factory) -> Path:
     """The ``bin`` of a new virtual environment with the wheel in it.
 
-    It borrows the dependencies of the running one. A folder named in a .pth file has its own .pth
+    It borrows the dependencies of the running one, and pip. A folder named in a .pth file has its own .pth
     files ignored, so an editable install of this repository stays out of sight.
     """
     home = tmp_path_factory.mktemp("environment")
-    venv.create(home, with_pip=True)
+    venv.create(home)
     python = home / "bin" / "python"
     site = run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=home).strip()
     borrowed = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))

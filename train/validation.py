@@ -159,7 +159,7 @@ def _drive(batch: Batch, act: Act) -> Score:
     each = np.arange(batch.n, dtype=np.int32)
     batch.begin(everywhere, each, each % len(batch.simulator.platforms))
     batch.observe(everywhere)
-    running, played = everywhere.copy(), 0
+    running, played, ends = everywhere.copy(), 0, _ends_of_travel(batch)
     terms, reward, peak, at_ends = np.zeros(N_TERMS), 0.0, 0.0, 0
     costs, counts, used = np.zeros(batch.n), np.zeros(batch.n), np.zeros((batch.n, 9))
     while running.any():
@@ -172,7 +172,7 @@ def _drive(batch: Batch, act: Act) -> Score:
         counts += running
         reward += float(arrays.reward.pull()[running].sum())
         peak = max(peak, float(tilt_rate(state)[running].max()))
-        used[running] = np.maximum(used[running], _travel_used(batch, state)[running])
+        used[running] = np.maximum(used[running], _travel_used(state, *ends)[running])
         at_ends += int(np.count_nonzero(state["limits"][running] & np.uint64(END_OF_TRAVEL)))
         played += int(running.sum())
         running &= ~(arrays.terminated.pull() | arrays.truncated.pull())
@@ -190,13 +190,17 @@ def _drive(batch: Batch, act: Act) -> Score:
     )
 
 
-def _travel_used(batch: Batch, state: NDArray[Any]) -> NDArray[np.float64]:
-    """(n, 9) where each actuator is, as a share of the way from neutral to the end ahead of it."""
+def _ends_of_travel(batch: Batch) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n, 9) least and greatest positions of the actuators, for the machine of each environment."""
     ends = [actuator_limits(platform) for platform in batch.simulator.platforms]
-    low, high = (
-        np.array([one[name] for one in ends])[batch.simulator.platform_of]
-        for name in ("position_min", "position_max")
-    )
+    of = batch.simulator.platform_of
+    return np.array([e["position_min"] for e in ends])[of], np.array([e["position_max"] for e in ends])[of]
+
+
+def _travel_used(
+    state: NDArray[Any], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, 9) where each actuator is, as a share of the way from neutral to the end ahead of it."""
     position = np.asarray(state["motion"]["position"], dtype=np.float64)
     end = np.where(position < 0.0, low, high)
     return np.divide(position, end, out=np.zeros_like(position), where=end != 0.0)

@@ -205,6 +205,8 @@ _DRAWN: Final = 0.62
 _SHADOW_RADIUS: Final = 2.1
 """Of the dark of the shadow, for the paper's machine, m."""
 _SHADOW_DARKNESS: Final = 0.75
+_SHADOW_REACH: Final = 1.8
+"""Where 8 bits can no longer show it, as a share of the radius."""
 
 
 def grid_lines(floor: float) -> tuple[Floats, Floats]:
@@ -250,15 +252,19 @@ class Shadow:
 
 def shadow(pygame: ModuleType, camera: Camera, size: tuple[int, int], scale: float, floor: float) -> Shadow:
     """A soft round shadow on the floor (z, m) below the camera's target; scale 1: the paper's machine."""
-    x, y = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5, indexing="ij")
+    rim = np.full((64, 3), floor)
+    rim[:, :2] = camera.target[:2] + circle(_SHADOW_REACH * _SHADOW_RADIUS * scale, len(rim))
+    edge = camera.project(rim)
+    low, high = (np.clip(ends, 0, size).astype(int) for ends in (edge.min(axis=0), edge.max(axis=0) + 1.0))
+    x, y = np.meshgrid(*(np.arange(a, b) + 0.5 for a, b in zip(low, high, strict=True)), indexing="ij")
     sight = np.stack([x - camera.center[0], y - camera.center[1], np.full_like(x, camera.focal)], axis=-1)
     rays = sight @ camera.axes
     way = (floor - camera.position[2]) / np.maximum(rays[..., 2:], 1e-6)
     hit = camera.position + rays * way
     distance = np.linalg.norm(hit[..., :2] - camera.target[:2], axis=-1) / (_SHADOW_RADIUS * scale)
     darkness = np.where(rays[..., 2] > 0.0, _SHADOW_DARKNESS * np.exp(-0.6 * distance**4), 0.0)
-    picture = pygame.Surface(size, pygame.SRCALPHA, 32)
+    picture = pygame.Surface(x.shape, pygame.SRCALPHA, 32)
     picture.fill((*theme.BACKDROP, 0))
     pygame.surfarray.pixels_alpha(picture)[...] = np.round(255.0 * darkness).astype(np.uint8)
     used = picture.get_bounding_rect()
-    return Shadow(picture.subsurface(used).copy(), np.array(used.topleft, float), size)
+    return Shadow(picture.subsurface(used).copy(), low + np.array(used.topleft, float), size)

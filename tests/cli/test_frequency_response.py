@@ -74,6 +74,7 @@ def benchmark(monkeypatch):
     )
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_benchmark_skips_what_knows_no_sinusoids_and_goes_on_after_a_failure(benchmark, tmp_path, capsys):
     assert main([*quick("benchmark"), "--out", str(tmp_path)]) == 1
     shown = capsys.readouterr().out

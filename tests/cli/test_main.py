@@ -100,6 +100,7 @@ def test_evaluate_writes_everything(simulator, cue_file, tmp_path, capsys):
         assert text in shown
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_maneuver_that_fails_leaves_the_others_and_exits_1(simulator, cue_file, tmp_path, capsys):
     fails, out = write_cues(tmp_path / "fails.csv"), tmp_path / "out"
     assert main(["evaluate", "--maneuvers", str(fails), str(cue_file), "--out", str(out)]) == 1
@@ -287,6 +288,7 @@ def test_the_label_of_a_compressed_file_is_its_stem(tmp_path):
         assert label == CueTrace.from_csv(tmp_path / name).name == name.partition(".csv")[0]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_maneuvers_with_like_names_have_their_own_files(simulator, tmp_path):
     files = [write_cues(tmp_path / name) for name in ("a b.csv", "a_b.csv", "A b.csv")]
     out = tmp_path / "out"
@@ -463,6 +465,7 @@ def test_a_shell_asks_for_names(capsys):
     assert "classical-tuned\tclassical at its best" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_results_are_json_for_other_tools(simulator, cue_file, tmp_path):
     main(["evaluate", "--maneuvers", str(cue_file), "--out", str(tmp_path / "out")])
     values = json.loads((tmp_path / "out" / "results.json").read_text())
@@ -489,6 +492,7 @@ def test_the_help_of_a_command_without_options_shows_none(capsys):
     assert "LISTCOMMAND" not in capsys.readouterr().out.upper()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_means_say_over_how_many_drives_they_are(simulator, cue_file, tmp_path, capsys):
     words = [
         "evaluate",

@@ -85,6 +85,7 @@ TEST = ["--axes", "f_x", "--frequencies", "15", "--settling", "0.1"]
     ],
     ids=lambda given: given[0] if isinstance(given, list) else "",
 )
+@pytest.mark.usefixtures("undrawn")
 def test_it_is_driven_and_named_after_its_class(words, file, folder, capsys):
     status = main([*words, "--out", "out"])
     assert status == 0, capsys.readouterr()
@@ -102,6 +103,7 @@ def test_it_is_drawn_and_served(folder, capsys):
     assert len(Trajectory.load("log.npz")) > 2
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_it_is_told_when_its_file_has_changed_that_drives_are_driven_anew(folder, capsys):
     words = ["compare", "--policies", "mine.py:Nudge", "--platforms", "paper", *DRIVE, "--out", "out"]
     driven = []

@@ -32,9 +32,11 @@ PROGRAM = (sys.executable, "-m", "motion_cueing.evaluation")
 
 
 @pytest.mark.parametrize("algo", tiny.ALGORITHMS)
+@pytest.mark.usefixtures("undrawn")
 def test_an_agent_comes_of_it(algo, tmp_path, capsys):
     out = tmp_path / "run"
-    words = ["train", "--algorithm", algo, "--config", str(tiny.config_file(tmp_path, algo))]
+    config_file = tiny.config_file(tmp_path, algo, hyperparameters={"gamma": 0.95})
+    words = ["train", "--algorithm", algo, "--config", str(config_file)]
     assert main([*words, "--seed", "3", "--envs", "5", "--out", str(out)]) == 0
     told = capsys.readouterr()
     assert "final.safetensors: the agent after" in told.out
@@ -72,6 +74,7 @@ def test_an_agent_is_evaluated(tmp_path, capsys):
     assert "lane-change" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     out = tmp_path / "run"
     path = tiny.config_file(tmp_path, "ppo", steps=10_000_000)
@@ -98,6 +101,7 @@ def test_ctrl_c_leaves_a_checkpoint_to_go_on_from(tmp_path):
     assert Agent.load(out / "final.safetensors").record.steps >= steps + 64
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_same_command_goes_on_and_fresh_begins_anew(tmp_path, capsys):
     out, config = tmp_path / "run", tiny.config_file(tmp_path, "ppo", steps=64)
     words = ["train", "--algorithm", "ppo", "--config", str(config), "--out", str(out)]
@@ -137,6 +141,7 @@ def test_ctrl_c_twice_interrupts_at_once():
     assert signal.getsignal(signal.SIGINT) is earlier
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_other_versions_at_resuming_are_told(tmp_path, capsys):
     folder = RunFolder.create(tmp_path / "run", tiny.config(tmp_path, "ppo", steps=64))
     Training(folder).train()
@@ -212,7 +217,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
         "broken": "a: 1\nb: [",
         "typo": "hyperparameters: {n_step: 3}",
         "drive": "task: {episode: {drives: [braking]}}",
-        "together": "hyperparameters: {train_freq: [1, year]}",
+        "together": "hyperparameters: {train_freq: [1, year]}\ntask: {episode: {library: 1}}",
         "nothing": "search: {}",
         "shape": "search: {hyperparameters.policy_kwargs.net_arch: {choices: [[4], [5]]}}",
         "reward": "search: {task.reward.tilt_rate: {low: 0.1, high: 1.0}}\nvalidation: {best: reward}",

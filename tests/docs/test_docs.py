@@ -58,6 +58,8 @@ SMALL = {
     'VecEnv(128, "cueing-preview", group=8)': f'VecEnv(8, "cueing-preview", group=8, {_FEW})',
 }
 """What makes the training of a tutorial a matter of seconds."""
+FEWER = {'group=8, episode={"library": 128})': 'group=8, episode={"library": 2})'}
+"""The same of the guide to other libraries."""
 
 
 def generate():
@@ -102,7 +104,7 @@ def folder(tmp_path, monkeypatch):
                          ids=lambda page: page.relative_to(ROOT).as_posix())  # fmt: skip
 def test_python_runs(page, folder):
     def smaller(code: str) -> str:
-        for large, small in SMALL.items():
+        for large, small in (SMALL | FEWER).items():
             code = code.replace(large, small)
         return code
 
@@ -111,9 +113,11 @@ def test_python_runs(page, folder):
     assert [name for name in shown if not (folder / name).exists()] == []
 
 
-def test_small_trainings_are_in_the_tutorial():
+def test_small_trainings_are_in_the_pages():
     text = text_of(DOCS / "tutorials" / "2-train.md")
     assert [large for large in SMALL if large not in text] == []
+    text = text_of(DOCS / "guides" / "other-libraries.md")
+    assert [large for large in FEWER if large not in text] == []
 
 
 def test_the_first_example_scores_better_than_standing_still_and_the_second_keeps_an_agent(folder, capsys):

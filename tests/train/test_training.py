@@ -163,7 +163,7 @@ def test_an_algorithm_without_memory_does_not_begin_with_one(tmp_path):
 
 
 def test_a_person_sees_references_noise_and_warnings_once_and_no_more_when_it_goes_on(tmp_path):
-    task = {"action": {"mode": "residual"}}
+    task = {"action": {"mode": "residual", "repeat": 1}}
     config = tiny.config(tmp_path, "ppo", task=task, validation={"every": 64}, group=2)
     folder = RunFolder.create(tmp_path / "run", config)
     seen = []

@@ -19,7 +19,7 @@ _COMMON: dict[str, Any] = {
     "task": {
         "preset": None,
         "observation": {"preview": 2},
-        "action": {"mode": "acceleration"},
+        "action": {"mode": "acceleration", "repeat": 5},
         "episode": {"library": 2, "drive_duration": 6.0, "duration": 1.0},
     },
     "validation": {"every": 160, "drives": 2, "duration": 5.0},
@@ -30,14 +30,15 @@ _NORMALIZED = {"observation": True, "reward": True}
 _NET = {"policy_kwargs": {"net_arch": [8, 8]}}
 _GRADIENT = {"net_arch": [8]}
 _ON_POLICY = {"n_steps": 16, "batch_size": 32, **_NET}
-_RECURRENT = merge(_ON_POLICY, {"policy_kwargs": {"lstm_hidden_size": 6}})
+_PPO = merge(_ON_POLICY, {"n_epochs": 3})
+_RECURRENT = merge(_PPO, {"policy_kwargs": {"lstm_hidden_size": 6}})
 _OFF_POLICY = {"learning_starts": 60, "batch_size": 16, "buffer_size": 240, "gradient_steps": 1, **_NET}
 
 
 def values(algo: str, /, **fields: Any) -> dict[str, Any]:
     """Fields of a tiny configuration."""
     hyperparameters = {
-        "ppo": _ON_POLICY,
+        "ppo": _PPO,
         "trpo": _ON_POLICY,
         "recurrent-ppo": _RECURRENT,
         "apg": _GRADIENT,

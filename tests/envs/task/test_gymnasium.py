@@ -5,8 +5,6 @@ from __future__ import annotations
 import copy
 import importlib.metadata
 import pickle
-import subprocess
-import sys
 import warnings
 
 import gymnasium
@@ -29,26 +27,12 @@ pytestmark = pytest.mark.slow
 ID = motion_cueing.envs.ENVIRONMENT_ID
 
 
-def python(code: str) -> str:
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-
-
 def test_registering_twice_changes_nothing_and_warns_of_nothing():
     before = gymnasium.registry[ID]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         importlib.reload(motion_cueing.envs)
     assert gymnasium.registry[ID] is before
-
-
-def test_make_imports_the_package_by_itself_and_nothing_heavy():
-    code = (
-        "import gymnasium, sys\n"
-        f"e = gymnasium.make('motion_cueing.envs:{ID}', episode=dict(library=1, drive_duration=1.0))\n"
-        "e.reset(seed=0)\n"
-        "print(type(e.unwrapped).__name__, [m for m in ('torch', 'matplotlib') if m in sys.modules])"
-    )
-    assert python(code).split("\n")[-2] == "DrivingSimulator []"
 
 
 def test_make_vec_gives_the_native_batch():
@@ -71,12 +55,16 @@ def test_gymnasiums_wrappers_of_batches_accept_it():
     assert list(info["episode"]["l"]) == [40, 40]
 
 
+DRAWN = ("defaults", "builds", "dim hexapod", "24-inch", "nads-1")
+"""Options that a picture depends on: those of the machine."""
+
+
 @pytest.mark.parametrize("name", EVERY_OPTION)
 def test_gymnasiums_checker_finds_nothing_to_warn_of(name):
     env = gymnasium.make(ID, **options(name)).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(env)
+        check_env(env, skip_render_check=name not in DRAWN)
 
 
 @pytest.mark.parametrize("name", EVERY_OPTION)

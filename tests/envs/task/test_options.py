@@ -75,9 +75,10 @@ def test_every_environment_has_a_native_batch():
 
 def test_typical_scaling_shows_rows_of_about_unit_size():
     """Over what they usually are: fixed numbers, so the physical entries are known from them."""
-    few = {"library": 24}
-    shown = DrivingSimulator("cueing-preview", episode=few)
-    physical = DrivingSimulator("cueing-preview", episode=few, observation={"scaling": "physical"})
+    shown = DrivingSimulator("cueing-preview", episode={"library": 24})
+    physical = DrivingSimulator(
+        "cueing-preview", drives=shown.batch.drives, observation={"scaling": "physical"}
+    )
     gains = shown.batch.layout.gains
     assert (physical.batch.layout.gains == 1.0).all()
     seen = []

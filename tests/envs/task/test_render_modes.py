@@ -195,18 +195,19 @@ def test_frames_of_a_batch_are_those_of_single_environments(autoreset_mode):
     assert names == where
 
 
-def test_without_a_render_mode_nothing_is_drawn_and_pygame_is_not_imported():
+def test_make_imports_the_package_by_itself_and_without_a_render_mode_draws_nothing_and_needs_no_pygame():
     code = (
-        "import motion_cueing.envs, gymnasium, sys, warnings\n"
-        f"e = gymnasium.make('{ID}', episode=dict(library=1, drive_duration=1.0))\n"
+        "import gymnasium, sys, warnings\n"
+        f"e = gymnasium.make('motion_cueing.envs:{ID}', episode=dict(library=1, drive_duration=1.0))\n"
         "e.reset(seed=0); e.step(e.action_space.sample())\n"
         "with warnings.catch_warnings(record=True) as told:\n"
         "    warnings.simplefilter('always')\n"
         "    assert e.unwrapped.render() is None\n"
-        "print('pygame' in sys.modules, 'give render_mode' in str(told[0].message))"
+        "print(type(e.unwrapped).__name__, 'give render_mode' in str(told[0].message))\n"
+        "print([m for m in ('pygame', 'torch', 'matplotlib') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split("\n")[-2] == "False True"
+    assert done.stdout.splitlines()[-2:] == ["DrivingSimulator True", "[]"]
 
 
 def test_without_pygame_the_extra_is_named():

@@ -29,8 +29,13 @@ def pair(mode: AutoresetMode, **arguments):
     return DrivingSimulatorVector(N, autoreset_mode=mode, **arguments), loop
 
 
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-@pytest.mark.parametrize("name", EVERY_OPTION)
+MODES = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+# Every option with one of the modes, and both where episodes end early or begin on another machine.
+CASES = {(name, MODES[k % 2]) for k, name in enumerate(EVERY_OPTION)}
+CASES |= {(name, mode) for name in ("defaults", "termination", "stack", "builds") for mode in MODES}
+
+
+@pytest.mark.parametrize(("name", "mode"), sorted(CASES, key=str))
 def test_batch_is_a_loop_of_single_environments_bit_for_bit(name, mode):
     batch, loop = pair(mode, **options(name))
     seen, expected = batch.reset(seed=5), loop.reset(seed=5)
