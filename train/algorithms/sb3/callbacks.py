@@ -1,4 +1,4 @@
-"""Callbacks for algorithms on policy: noise that falls, and a learning rate that keeps updates of one size.
+"""Callbacks for PPO: a critic that learns first, noise that falls, and updates of one size.
 
 They work with any ``learn`` of Stable-Baselines3, as ``callback=AnnealedNoise(0.5, 0.1)``.
 """
@@ -19,6 +19,28 @@ _RATES: Final = (1e-5, 4e-3)
 
 _LEAST: Final = 0.1
 """Least share of the target that is left at the end."""
+
+
+class CriticFirst(BaseCallback):
+    """The critic learns alone for a while: one that knows nothing would lead the actor astray.
+
+    Args:
+        rollouts: As many as the actor stays what it is.
+    """
+
+    def __init__(self, rollouts: int) -> None:
+        super().__init__()
+        self._rollouts = rollouts
+
+    def _on_rollout_start(self) -> None:
+        policy: Any = self.model.policy
+        per_rollout = self.model.n_steps * self.training_env.num_envs  # type: ignore[attr-defined]
+        acts = self.num_timesteps >= self._rollouts * per_rollout
+        for layers in (policy.mlp_extractor.policy_net, policy.action_net):
+            layers.requires_grad_(acts)
+
+    def _on_step(self) -> bool:
+        return True
 
 
 class AnnealedNoise(BaseCallback):

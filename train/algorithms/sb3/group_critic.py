@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3.common.policies import ActorCriticPolicy
@@ -77,8 +78,42 @@ class _ActorSeesHalf(MlpExtractor):
         return super().forward_actor(features[:, : self._seen])
 
 
+class _TwoRates(torch.optim.Adam):
+    """Adam whose second group of parameters has a learning rate of its own, whatever is set for all."""
+
+    second_rate: float
+
+    def step(self, closure: Any = None) -> Any:
+        self.param_groups[1]["lr"] = self.second_rate
+        return super().step(closure)
+
+
 class GroupCriticPolicy(ActorCriticPolicy):
-    """``MlpPolicy`` for :class:`Deviations`, with its arguments: the critic sees them, the actor does not."""
+    """``MlpPolicy`` for :class:`Deviations`: the critic sees them, the actor does not.
+
+    Args:
+        *args: Of ``MlpPolicy``.
+        critic_learning_rate: Of the critic alone, which need not wait for the actor's small steps; None for
+            that of both.
+        **kwargs: Of ``MlpPolicy``.
+    """
+
+    def __init__(self, *args: Any, critic_learning_rate: float | None = None, **kwargs: Any) -> None:
+        self._critic_learning_rate = critic_learning_rate
+        super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = _ActorSeesHalf(self.features_dim, self.net_arch, self.activation_fn, self.device)
+
+    def _build(self, lr_schedule: Any) -> None:
+        super()._build(lr_schedule)
+        if self._critic_learning_rate is not None:
+            critic = self.critic_parameters()
+            actor = [one for one in self.parameters() if not any(one is other for other in critic)]
+            groups = [{"params": actor}, {"params": critic}]
+            self.optimizer = _TwoRates(groups, lr=lr_schedule(1.0), eps=self.optimizer.defaults["eps"])
+            self.optimizer.second_rate = self._critic_learning_rate
+
+    def critic_parameters(self) -> list[torch.nn.Parameter]:
+        """Those that tell values, and act on no action."""
+        return [*self.mlp_extractor.value_net.parameters(), *self.value_net.parameters()]

@@ -21,11 +21,11 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
-from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from ....envs.errors import ConfigurationError, suggest
 from ....envs.settings import Positive
+from ....envs.task.options import Count
 from ...agents import PolicyNetwork
 from ...agents.agent import base_policy
 from ...config import TrainingConfig
@@ -36,7 +36,7 @@ from ...training import initial_network
 from ...validation import Act
 from ...vec_env import DrivingSimulatorVecEnv
 from .advice import advice
-from .callbacks import AdaptiveLearningRate, AnnealedNoise
+from .callbacks import AdaptiveLearningRate, AnnealedNoise, CriticFirst
 from .group_critic import Deviations, GroupCriticPolicy
 from .policy import CLASSES, SkipPolicy, load_network, network_of
 from .state import exploring, restore, restore_random, state_of
@@ -51,7 +51,7 @@ NOISES: Final[Mapping[str, Any]] = {
 """Names that ``noise_type`` takes."""
 
 _NOISE: Final = ("noise_type", "noise_std")
-_CALLBACKS: Final = ("annealed_std", "adaptive_kl")
+_CALLBACKS: Final = ("critic_first", "annealed_std", "adaptive_kl")
 _POLICY: Final = "policy"
 OURS: Final = {
     "self", "policy", "env", "verbose", "seed", "device", "tensorboard_log", "stats_window_size",
@@ -77,9 +77,8 @@ def arguments(
         hyperparameters: As in rl-baselines3-zoo: numbers may be schedules (``lin_3e-4``); ``policy_kwargs``
             is a mapping, its ``activation_fn`` one of :data:`TORCH_ACTIVATIONS`. ``policy`` is "MlpPolicy"
             ("MlpLstmPolicy" for RecurrentPPO) or, for PPO and TRPO, "SkipPolicy", with a skip connection,
-            or "GroupCriticPolicy".
-            ``noise_type`` and ``noise_std`` make the action noise. On policy, ``annealed_std`` and
-            ``adaptive_kl`` are the arguments of :mod:`.callbacks`; see :func:`callbacks_of`.
+            or "GroupCriticPolicy". ``noise_type`` and ``noise_std`` make the action noise. PPO also has
+            those of :func:`callbacks_of`.
         action_size: Entries of an action.
 
     Raises:
@@ -87,15 +86,16 @@ def arguments(
     """
     known = parameters(algorithm, OURS)
     noisy = "action_noise" in inspect.signature(algorithm).parameters
-    own = [*(_NOISE if noisy else ()), *(_CALLBACKS if issubclass(algorithm, OnPolicyAlgorithm) else ())]
+    own = [*(_NOISE if noisy else ()), *(_CALLBACKS if algorithm is PPO else ())]
     _refuse_unknown("hyperparameters", hyperparameters, [*known, _POLICY, *own])
     callbacks_of(hyperparameters)
     given = {n: v for n, v in hyperparameters.items() if n not in (*_NOISE, *_CALLBACKS, _POLICY)}
-    given["policy_kwargs"] = _policy_kwargs(algorithm, given.get("policy_kwargs") or {})
-    checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in given.items()}
-    checked[_POLICY] = _policy(
+    policy = _policy(
         algorithm, hyperparameters.get(_POLICY, _plain(algorithm)), bool(hyperparameters.get("use_sde"))
     )
+    given["policy_kwargs"] = _policy_kwargs(algorithm, policy, given.get("policy_kwargs") or {})
+    checked = {name: _checked(f"hyperparameters.{name}", v, known[name]) for name, v in given.items()}
+    checked[_POLICY] = policy
     if "noise_type" in hyperparameters or "noise_std" in hyperparameters:
         checked["action_noise"] = _noise(hyperparameters, action_size)
     return checked
@@ -135,11 +135,13 @@ def _refuse_unknown(where: str, given: Mapping[str, Any], known: list[str]) -> N
             raise ConfigurationError(f"{where}: unknown field {name!r}. {suggest(str(name), known)}")
 
 
-def _policy_kwargs(algorithm: type[BaseAlgorithm], given: Any) -> dict[str, Any]:
+def _policy_kwargs(algorithm: type[BaseAlgorithm], policy: Any, given: Any) -> dict[str, Any]:
     where = "hyperparameters.policy_kwargs"
     if not isinstance(given, Mapping):
         raise ConfigurationError(f"{where}: expected fields with values, found {given!r}")
     known = parameters(algorithm.policy_aliases[_plain(algorithm)], _OURS_OF_POLICY)
+    if policy is GroupCriticPolicy:
+        known |= {"critic_learning_rate": Positive}
     _refuse_unknown(where, given, list(known))
     checked = dict(given)
     if "activation_fn" in checked:
@@ -173,13 +175,17 @@ def callbacks_of(hyperparameters: Mapping[str, Any]) -> list[BaseCallback]:
     """What acts on the model between its updates.
 
     Args:
-        hyperparameters: ``annealed_std``, the standard deviation of the actions at first and at the end;
-            ``adaptive_kl``, the divergence of an update that the learning rate is to keep.
+        hyperparameters: ``critic_first``: rollouts in which the critic alone learns. ``annealed_std``: the
+            standard deviation of the actions at first and at the end. ``adaptive_kl``: the divergence of an
+            update that the learning rate is to keep.
 
     Raises:
         ConfigurationError: one is not of positive numbers.
     """
     found: list[BaseCallback] = []
+    first = hyperparameters.get("critic_first")
+    if first is not None:
+        found.append(CriticFirst(_checked("hyperparameters.critic_first", first, Count)))
     kl, rate = hyperparameters.get("adaptive_kl"), hyperparameters.get("learning_rate", 1e-3)
     if kl is not None:
         if str(rate).startswith(SCHEDULED):

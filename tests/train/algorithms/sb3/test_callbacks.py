@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+
 import gymnasium
 import numpy as np
 import pytest
+import torch
+from sb3_contrib import TRPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.train.algorithms.sb3.callbacks import AdaptiveLearningRate, AnnealedNoise
+from motion_cueing.train.algorithms.sb3.callbacks import AdaptiveLearningRate, AnnealedNoise, CriticFirst
 from motion_cueing.train.algorithms.sb3.sb3 import arguments, callbacks_of
 
 
@@ -31,11 +35,11 @@ class Look(BaseCallback):
         return True
 
 
-def learned(callback: BaseCallback, steps: int, **options) -> Look:
+def learned(callback, steps: int, **options) -> Look:
     env, look = DummyVecEnv([lambda: gymnasium.make("Pendulum-v1")]), Look()
     model = PPO("MlpPolicy", env, n_steps=64, batch_size=32, seed=0, device="cpu", **options)
     model.set_logger(Logger(None, output_formats=[]))
-    model.learn(steps, callback=[callback, look], log_interval=None)
+    model.learn(steps, callback=[*np.ravel(callback), look], log_interval=None)
     return look
 
 
@@ -58,13 +62,40 @@ def test_the_learning_rate_follows_the_divergence():
     assert len(set(rates)) > 3
 
 
-def test_they_are_hyperparameters_of_algorithms_on_policy():
-    given = {"annealed_std": [0.5, 0.1], "adaptive_kl": 0.02, "learning_rate": 5e-4}
+def test_the_critic_learns_alone_at_first():
+    before: list[dict] = []
+
+    class Keep(BaseCallback):
+        def _on_rollout_start(self):
+            before.append({name: value.clone() for name, value in self.model.policy.state_dict().items()})
+
+        def _on_step(self):
+            return True
+
+    learned([CriticFirst(2), Keep()], 64 * 4)
+    moved = [
+        {name for name in last if not torch.equal(last[name], now[name])}
+        for last, now in itertools.pairwise(before)
+    ]
+    critic = {name for name in before[0] if "value" in name}
+    assert moved[0] == moved[1] == critic | {"log_std"}
+    assert moved[2] == set(before[0])
+
+
+def test_they_are_hyperparameters_of_ppo():
+    given = {"critic_first": 2, "annealed_std": [0.5, 0.1], "adaptive_kl": 0.02, "learning_rate": 5e-4}
     kinds = [type(one) for one in callbacks_of(given)]
-    assert kinds == [AdaptiveLearningRate, AnnealedNoise]
-    assert callbacks_of(given)[0].rate == 5e-4
-    assert not {"annealed_std", "adaptive_kl"} & arguments(PPO, given, 4).keys()
-    for wrong in ({"annealed_std": 0.5}, {"annealed_std": [0.5, 0.0]}, {"adaptive_kl": -1.0}):
+    assert kinds == [CriticFirst, AdaptiveLearningRate, AnnealedNoise]
+    assert callbacks_of(given)[1].rate == 5e-4
+    assert arguments(PPO, given, 4).keys() == {"learning_rate", "policy", "policy_kwargs"}
+    with pytest.raises(ConfigurationError, match="unknown field 'critic_first'"):
+        arguments(TRPO, given, 4)
+    for wrong in (
+        {"critic_first": -1},
+        {"annealed_std": 0.5},
+        {"annealed_std": [0.5, 0.0]},
+        {"adaptive_kl": -1.0},
+    ):
         with pytest.raises(ConfigurationError, match=next(iter(wrong))):
             arguments(PPO, wrong, 4)
     with pytest.raises(ConfigurationError, match="a number with adaptive_kl"):

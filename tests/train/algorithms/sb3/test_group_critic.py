@@ -83,6 +83,18 @@ def test_the_actor_does_not_see_them_and_the_critic_does(algorithm):
     )
 
 
+def test_the_critic_has_a_learning_rate_of_its_own():
+    kwargs = {"net_arch": [9], "critic_learning_rate": 0.0}
+    model = PPO(
+        GroupCriticPolicy, Deviations(machines()), n_steps=8, batch_size=24, seed=0, policy_kwargs=kwargs
+    )
+    before = {name: value.clone() for name, value in model.policy.state_dict().items()}
+    model.learn(96)
+    same = {name for name, value in model.policy.state_dict().items() if torch.equal(value, before[name])}
+    assert same == {name for name in before if "value" in name}
+    assert model.policy.optimizer.param_groups[0]["lr"] == 3e-4
+
+
 def test_a_training_makes_an_agent_of_the_actor():
     config = load_config(
         "ppo", None, task=TASK, n_envs=N, group=GROUP, steps=96,
