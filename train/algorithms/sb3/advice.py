@@ -17,6 +17,7 @@ from ....envs.task.episode import platform_of
 from ....envs.task.kernels.action import acceleration_scale, action_scale, velocity_scale
 from ....envs.task.options import TaskOptions
 from ...config import TrainingConfig
+from .group_critic import GroupCriticPolicy
 
 _HOPELESS: Final = 0.9
 """Share of actions at their bound from which nothing can be learned."""
@@ -65,11 +66,11 @@ def _short_horizon(config: TrainingConfig, algorithm: type[BaseAlgorithm]) -> st
     time, horizon = travel_time(config.task), _horizon(config, algorithm)
     if time is None or horizon >= time:
         return None
-    on_policy = issubclass(algorithm, OnPolicyAlgorithm)
-    fields, verb = ("gamma and gae_lambda", "credit") if on_policy else ("gamma", "credits")
+    fields = _horizon_fields(config, algorithm)
+    names, verb = " and ".join(fields), "credits" if len(fields) == 1 else "credit"
     return (
-        f"hyperparameters: {fields} {verb} an action for {horizon:.1f} s, but its travel costs after "
-        f"{time:.1f} s; raise {fields}, or charge travel earlier (task.reward.stroke_margin, stroke_braking)"
+        f"hyperparameters: {names} {verb} an action for {horizon:.1f} s, but its travel costs after "
+        f"{time:.1f} s; raise {names}, or charge travel earlier (task.reward.stroke_margin, stroke_braking)"
     )
 
 
@@ -77,12 +78,17 @@ def _horizon(config: TrainingConfig, algorithm: type[BaseAlgorithm]) -> float:
     """How far ahead an action is credited: the trace of GAE, or the discount's time constant, s."""
     defaults = inspect.signature(algorithm).parameters
     share = 1.0
-    for name in ("gamma", "gae_lambda"):
-        if name in defaults:
-            value: Any = config.hyperparameters.get(name, defaults[name].default)
-            share *= float(value)
+    for name in _horizon_fields(config, algorithm):
+        value: Any = config.hyperparameters.get(name, defaults[name].default)
+        share *= float(value)
     step = TIME_STEP * config.task.action.repeat
     return math.inf if share >= 1.0 else step / (1.0 - share)
+
+
+def _horizon_fields(config: TrainingConfig, algorithm: type[BaseAlgorithm]) -> list[str]:
+    """Hyperparameters that the horizon follows from; a critic that knows machines bridges a short trace."""
+    critic = config.hyperparameters.get("policy") == GroupCriticPolicy.__name__
+    return ["gamma", "gae_lambda"] if issubclass(algorithm, OnPolicyAlgorithm) and not critic else ["gamma"]
 
 
 def travel_time(task: TaskOptions) -> float | None:

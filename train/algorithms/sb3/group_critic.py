@@ -73,6 +73,8 @@ class _ActorSeesHalf(MlpExtractor):
         super().__init__(size, net_arch, activation_fn, device)
         self._seen = size // 2
         self.policy_net = MlpExtractor(self._seen, net_arch, activation_fn, device).policy_net
+        # What is to come grows with a deviation, and a tanh saturates.
+        self.value_net = MlpExtractor(size, net_arch, torch.nn.ELU, device).value_net
 
     def forward_actor(self, features: Any) -> Any:
         return super().forward_actor(features[:, : self._seen])
@@ -89,7 +91,7 @@ class _TwoRates(torch.optim.Adam):
 
 
 class GroupCriticPolicy(ActorCriticPolicy):
-    """``MlpPolicy`` for :class:`Deviations`: the critic sees them, the actor does not.
+    """``MlpPolicy`` for :class:`Deviations`: the critic sees them, the actor does not; the critic has ELUs.
 
     Args:
         *args: Of ``MlpPolicy``.

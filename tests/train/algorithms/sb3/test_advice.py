@@ -26,6 +26,9 @@ LONG = {"gamma": 0.999, "gae_lambda": 0.99, "n_steps": 8, "batch_size": 8}
 def test_a_sound_configuration_is_not_commented():
     assert advice("ppo", hyperparameters=LONG) == []
     assert advice("sac", hyperparameters={"gamma": 0.995}) == []
+    # A critic that knows how machines differ bridges a short trace.
+    critic = {**LONG, "policy": "GroupCriticPolicy", "gae_lambda": 0.5}
+    assert advice("ppo", n_envs=8, group=8, hyperparameters=critic) == []
     assert ALGORITHMS["apg"].advice(load_config("apg")) == []
 
 
