@@ -212,7 +212,7 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
     Args:
         algo: The algorithm; None for the one that the file names.
         path: YAML file with any of the fields, or one of :func:`recipe_names`; mappings are merged (but for
-            ``search``), all else replaces.
+            ``search``, and a ``task`` that names its ``preset``), all else replaces.
         **fields: Fields of :class:`TrainingConfig` that go before the file; None leaves one as it is.
 
     Raises:
@@ -230,6 +230,9 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
         raise ConfigurationError(f"--algorithm is missing; use one of {', '.join(algorithm_names())}")
     default = preset_of(str(name))
     preset = {} if default is None else _fields(default)
+    if "preset" in (given.get("task") or {}):
+        # A task that is named is meant as a whole, too.
+        preset = {key: value for key, value in preset.items() if key != "task"}
     chosen = {key: value for key, value in fields.items() if value is not None}
     merged = merge(merge(preset, given), {"algo": name, **chosen})
     if "search" in given:

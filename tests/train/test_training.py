@@ -66,10 +66,23 @@ _NOISE = {"noise_type": "ornstein-uhlenbeck"}
 _NOT_NORMALIZED = {"observation": False, "reward": False}
 CASES = {
     "ppo, schedules": ("ppo", {"hyperparameters": _SCHEDULES}),
+    "ppo, a critic of groups, annealed noise, an adaptive learning rate": (
+        "ppo",
+        {
+            "group": 2,
+            "normalize": _NOT_NORMALIZED,
+            "hyperparameters": {
+                "policy": "GroupCriticPolicy",
+                "critic_first": 1,
+                "annealed_std": [0.5, 0.1],
+                "adaptive_kl": 0.02,
+            },
+        },
+    ),
     "ppo, residual": ("ppo", {"task": {"action": {"mode": "residual"}}}),
     "ppo, gains, state-dependent exploration": (
         "ppo",
-        {"task": {"action": {"mode": "gains"}}, "hyperparameters": {"use_sde": True}},
+        {"task": {"action": {"mode": "gains", "bound": 1.0}}, "hyperparameters": {"use_sde": True}},
     ),
     "sac, full replay buffer, returns of several steps": (
         "sac",

@@ -84,12 +84,14 @@ class AdaptiveLearningRate(BaseCallback):
     def __init__(self, target: float, rate: float = 1e-3) -> None:
         super().__init__()
         self._target, self.rate = target, rate
+        self.adapted_at = 0  # actions; a checkpoint of this rollout needs no second change
 
     def _on_rollout_start(self) -> None:
         done = min(self.num_timesteps / self.locals["total_timesteps"], 1.0)
         target = self._target * max(1.0 - done, _LEAST)
         moved = self.logger.name_to_value.get("train/approx_kl")
-        if moved is not None:
+        if moved is not None and self.num_timesteps > self.adapted_at:
+            self.adapted_at = self.num_timesteps
             if moved > _APART * target:
                 self.rate = max(self.rate / _APART, _RATES[0])
             elif moved < target / _APART:

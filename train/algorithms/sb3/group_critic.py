@@ -95,12 +95,11 @@ class GroupCriticPolicy(ActorCriticPolicy):
 
     Args:
         *args: Of ``MlpPolicy``.
-        critic_learning_rate: Of the critic alone, which need not wait for the actor's small steps; None for
-            that of both.
+        critic_learning_rate: Of the critic alone, which need not wait for the actor's small steps.
         **kwargs: Of ``MlpPolicy``.
     """
 
-    def __init__(self, *args: Any, critic_learning_rate: float | None = None, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, critic_learning_rate: float = 1e-3, **kwargs: Any) -> None:
         self._critic_learning_rate = critic_learning_rate
         super().__init__(*args, **kwargs)
 
@@ -109,13 +108,8 @@ class GroupCriticPolicy(ActorCriticPolicy):
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
-        if self._critic_learning_rate is not None:
-            critic = self.critic_parameters()
-            actor = [one for one in self.parameters() if not any(one is other for other in critic)]
-            groups = [{"params": actor}, {"params": critic}]
-            self.optimizer = _TwoRates(groups, lr=lr_schedule(1.0), eps=self.optimizer.defaults["eps"])
-            self.optimizer.second_rate = self._critic_learning_rate
-
-    def critic_parameters(self) -> list[torch.nn.Parameter]:
-        """Those that tell values, and act on no action."""
-        return [*self.mlp_extractor.value_net.parameters(), *self.value_net.parameters()]
+        critic = [*self.mlp_extractor.value_net.parameters(), *self.value_net.parameters()]
+        actor = [one for one in self.parameters() if not any(one is other for other in critic)]
+        groups = [{"params": actor}, {"params": critic}]
+        self.optimizer = _TwoRates(groups, lr=lr_schedule(1.0), eps=self.optimizer.defaults["eps"])
+        self.optimizer.second_rate = self._critic_learning_rate

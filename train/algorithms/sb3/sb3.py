@@ -309,7 +309,9 @@ class SB3Learner(Learner):
     def state(self) -> dict[str, Any]:
         """Weights, optimizers, replay buffer, normalization, environments, random generators, log."""
         whole = state_of(self.model, self.simulators, self.normalize)
-        rates = [one.rate for one in self.callbacks if isinstance(one, AdaptiveLearningRate)]
+        rates = [
+            [one.rate, one.adapted_at] for one in self.callbacks if isinstance(one, AdaptiveLearningRate)
+        ]
         return {**whole, "monitor": self.monitor.state(), "told": self._logged(), "rates": rates}
 
     def restore(self, state: State) -> None:
@@ -319,8 +321,8 @@ class SB3Learner(Learner):
         self.monitor.restore(state["monitor"])
         self.model.logger.name_to_value.update(state["told"])
         adaptive = [one for one in self.callbacks if isinstance(one, AdaptiveLearningRate)]
-        for callback, rate in zip(adaptive, state.get("rates", []), strict=True):
-            callback.rate = rate
+        for callback, saved in zip(adaptive, state.get("rates", []), strict=True):
+            callback.rate, callback.adapted_at = saved
 
 
 def _model(
