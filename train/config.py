@@ -30,6 +30,9 @@ EVALUATION_ONLY: Final = (
     "leave it empty for random drives"
 )
 
+_WHOLE: Final = {"task": "preset", "hyperparameters": "policy"}
+"""Fields of a file that begin anew where they have this entry, not with an algorithm's preset."""
+
 _RECIPES: Final = Path(__file__).parent / "recipes"
 
 
@@ -211,8 +214,9 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
 
     Args:
         algo: The algorithm; None for the one that the file names.
-        path: YAML file with any of the fields, or one of :func:`recipe_names`; mappings are merged (but for
-            ``search``, and a ``task`` that names its ``preset``), all else replaces.
+        path: YAML file with any of the fields, or one of :func:`recipe_names`; mappings are merged, all else
+            replaces. ``search``, a ``task`` that names its ``preset`` and ``hyperparameters`` that name their
+            ``policy`` are meant as a whole.
         **fields: Fields of :class:`TrainingConfig` that go before the file; None leaves one as it is.
 
     Raises:
@@ -230,9 +234,9 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
         raise ConfigurationError(f"--algorithm is missing; use one of {', '.join(algorithm_names())}")
     default = preset_of(str(name))
     preset = {} if default is None else _fields(default)
-    if "preset" in (given.get("task") or {}):
-        # A task that is named is meant as a whole, too.
-        preset = {key: value for key, value in preset.items() if key != "task"}
+    for key, name_of in _WHOLE.items():
+        if name_of in (given.get(key) or {}):
+            preset = {name: value for name, value in preset.items() if name != key}
     chosen = {key: value for key, value in fields.items() if value is not None}
     merged = merge(merge(preset, given), {"algo": name, **chosen})
     if "search" in given:

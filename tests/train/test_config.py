@@ -101,6 +101,10 @@ def test_a_task_is_changed_field_by_field_or_begun_anew(tmp_path):
     assert load_config("ppo", file).task == load_task("cueing")
     file.write_text("task: {preset: null, action: {repeat: 10}}\n")
     assert load_config("ppo", file).task == TaskOptions(action=ActionOptions(repeat=10))
+    file.write_text("hyperparameters: {policy: MlpPolicy, n_steps: 8}\n")
+    assert load_config("ppo", file).hyperparameters == {"policy": "MlpPolicy", "n_steps": 8}
+    file.write_text("hyperparameters: {n_steps: 8}\n")
+    assert load_config("ppo", file).hyperparameters == {**load_config("ppo").hyperparameters, "n_steps": 8}
     file.write_text("n_envs: 6\ngroup: 4\n")
     with pytest.raises(ConfigurationError, match="n_envs 6 must be a multiple of group 4"):
         load_config("ppo", file)

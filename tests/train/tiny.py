@@ -31,8 +31,7 @@ _NET = {"policy_kwargs": {"net_arch": [8, 8]}}
 _GRADIENT = {"net_arch": [8]}
 _ON_POLICY = {"n_steps": 16, "batch_size": 32, **_NET}
 _FEW_EPOCHS = merge(_ON_POLICY, {"n_epochs": 3})
-_PLAIN = {"policy": "MlpPolicy", "critic_first": None, "annealed_std": None, "adaptive_kl": None}
-_PPO = {**_FEW_EPOCHS, **_PLAIN}
+_PPO = {**_FEW_EPOCHS, "policy": "MlpPolicy"}
 _RECURRENT = merge(_FEW_EPOCHS, {"policy_kwargs": {"lstm_hidden_size": 6}})
 _OFF_POLICY = {"learning_starts": 60, "batch_size": 16, "buffer_size": 240, "gradient_steps": 1, **_NET}
 
