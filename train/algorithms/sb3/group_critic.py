@@ -51,13 +51,14 @@ class Deviations(VecEnvWrapper):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Play the actions; ``terminal_observation`` has the deviations at the end, too."""
-        observation, reward, ended, infos = self.simulators.step_wait()
+        seen, reward, ended, infos = self.simulators.step_wait()
+        observation = np.asarray(seen)
         if ended.any():
             last = observation.copy()
-            for i in np.flatnonzero(ended):
+            for i in np.flatnonzero(ended).tolist():
                 last[i] = infos[i]["terminal_observation"]
             last = self._with_deviations(last)
-            for i in np.flatnonzero(ended):
+            for i in np.flatnonzero(ended).tolist():
                 infos[i]["terminal_observation"] = last[i]
         return self._with_deviations(observation), reward, ended, infos
 

@@ -14,6 +14,7 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.task.options import load_task
 from motion_cueing.train.algorithms.sb3.group_critic import Deviations, GroupCriticPolicy
 from motion_cueing.train.algorithms.sb3.policy import agent_of
+from motion_cueing.train.algorithms.sb3.saved import load_model
 from motion_cueing.train.algorithms.sb3.sb3 import SB3Learner
 from motion_cueing.train.config import load_config
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
@@ -63,7 +64,7 @@ def test_without_groups_there_is_nothing_to_deviate_from():
 
 
 @pytest.mark.parametrize("algorithm", [PPO, TRPO])
-def test_the_actor_does_not_see_them_and_the_critic_does(algorithm):
+def test_the_actor_does_not_see_them_and_the_critic_does(algorithm, tmp_path):
     env = Deviations(machines())
     model = algorithm(
         GroupCriticPolicy, env, n_steps=8, batch_size=24, seed=0, policy_kwargs={"net_arch": [9]}
@@ -77,7 +78,8 @@ def test_the_actor_does_not_see_them_and_the_critic_does(algorithm):
         values = [model.policy.predict_values(one) for one in (seen, other)]
     torch.testing.assert_close(first, second)
     assert not torch.allclose(*values)
-    agent = agent_of(model, TASK, "mine")
+    model.save(tmp_path / "model.zip")
+    agent = agent_of(load_model(tmp_path / "model.zip"), TASK, "mine")
     np.testing.assert_allclose(
         agent.predict(seen[:, :SIZE].numpy())[0], first.clamp(-1.0, 1.0).numpy(), atol=1e-5
     )
