@@ -22,21 +22,29 @@ _SIGNIFICANT: Final = 5
 """Digits of a parameter that a file needs: 0.001 % is far below what changes J."""
 
 
+_TURNTABLE_SHARE: Final = "turntable_share"
+
+
 class WashoutSpace:
     """The numbers of a parameter set that have an effect, as a unit cube.
 
     The orders of the filters, the blocks that are switched off, the start pose and what acts only after a
     limit was met stay those of the set the search begins with; so does the turntable's gain, which
-    ``rate_scale`` makes superfluous.
+    ``rate_scale`` makes superfluous. A machine without a turntable is given no share of the rotation.
 
     Args:
         start: The set a search begins with.
+        platform: The machine; None for one with a turntable.
     """
 
-    def __init__(self, start: AnyWashout) -> None:
-        self.start = start
+    def __init__(self, start: AnyWashout, platform: Platform | None = None) -> None:
         self._values = to_dict(start)
-        self.coordinates = tuple(c for c in family_of(start).coordinates if _has_effect(self._values, c.path))
+        coordinates = family_of(start).coordinates
+        if platform is not None and platform.turntable is None and _TURNTABLE_SHARE in self._values:
+            self._values[_TURNTABLE_SHARE] = 0.0
+            coordinates = tuple(c for c in coordinates if c.path != _TURNTABLE_SHARE)
+        self.start = from_dict(type(start), self._values, "search space")
+        self.coordinates = tuple(c for c in coordinates if _has_effect(self._values, c.path))
 
     def __len__(self) -> int:
         """How many numbers there are."""

@@ -137,7 +137,7 @@ class Search:
         command: str = "",
     ) -> None:
         self.options, self.objective, self.path, self.command = options, objective, path, command
-        self.space = WashoutSpace(options.start)
+        self.space = WashoutSpace(options.start, objective.platform)
         self.results: list[StepResult] = []
         self._method = _method(options, self.space)
         self._names, self._inputs = names, checksum(options, objective, self.space, self._method)

@@ -87,6 +87,15 @@ def test_parameters_without_effect_are_not_searched():
     assert {"hpi.2.damping", "lpc.frequency"} <= paths
 
 
+def test_a_machine_without_a_turntable_is_given_no_share_of_the_rotation():
+    platform = get_platform("paper-no-turntable")
+    space = WashoutSpace(START, platform)
+    assert START.turntable_share > 0.0
+    assert space.decode(np.full(len(space), 0.5)).turntable_share == 0.0
+    assert "turntable_share" not in {c.path for c in space.coordinates}
+    assert len(space) == len(WashoutSpace(START, get_platform("paper"))) - 1 == len(SPACE) - 1
+
+
 def test_a_result_has_few_digits_and_says_where_it_stands_at_a_bound():
     place = SPACE.encode(START)
     place[0] = 1.0
