@@ -34,8 +34,6 @@ TILTS_MORE = {
 }
 """Where an agent misses the bar, as docs/results/agents.md says: drives with a larger tilt rate than the
 tuned washout's, and with a large one for longer."""
-CHATTERS = {"learned-ppo"}
-"""As docs/results/agents.md says of it."""
 BEST = "learned-preview"
 """Better on every single maneuver, too."""
 BEGINNING = "linear-washout"
@@ -95,12 +93,11 @@ def test_it_tilts_no_faster_than_the_tuned_washout(agent, measured, washouts):
     assert (faster, longer) == TILTS_MORE.get(agent.name, (set(), set()))
 
 
-def test_it_does_not_chatter_where_the_car_is_driven_gently(agent, measured):
-    shaken = {n for n in ("steady-turn", "lane-change", "hill") if measured[n].vibration > 0.1}
-    assert bool(shaken) == (agent.name in CHATTERS)
+def test_it_does_not_chatter_where_the_car_is_driven_gently(measured):
+    assert max(measured[n].vibration for n in ("steady-turn", "lane-change", "hill")) < 0.1
 
 
-@pytest.mark.parametrize("name", ["learned", "learned-any", "learned-perceived", "learned-preview"])
+@pytest.mark.parametrize("name", [name for name in agent_names() if name != BEGINNING])
 def test_late_actuators_change_nothing_of_what_it_asks_for(name):
     """There is no loop through the actuators that lag and dead time could make swing."""
     agent, paper = get_agent(name), get_platform("paper")
@@ -123,7 +120,7 @@ def test_no_limit_of_the_machine_is_exceeded(driven):
 
 def test_its_record_says_how_it_was_made(agent):
     record = agent.record
-    assert record.command.startswith("motion-cueing train --algo ")
+    assert record.command.startswith("motion-cueing train --")
     assert record.steps > 0
     assert record.wall_time < 2.0 * 3600.0
     assert record.hardware
