@@ -26,6 +26,7 @@ BENCHMARK_POLICIES: Final = (
     "adaptive-tuned",
     "mpc",
     "nmpc",
+    "learned-ppo-now",
     "learned-perceived",
     "learned",
     "mpc-preview",
