@@ -7,7 +7,7 @@ import json
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -200,6 +200,11 @@ class Trajectory:
     def positions(self) -> Floats:
         """(n, 9) positions of the :data:`ACTUATORS`, m and rad."""
         return np.column_stack([self.carriage, self.legs, self.turntable])
+
+    def part(self, begin: int, end: int) -> Trajectory:
+        """The rows from ``begin`` to before ``end``; time starts at 0 again."""
+        columns: dict[str, Any] = {name: getattr(self, name)[begin:end] for name in _COLUMNS}
+        return replace(self, **{**columns, "time": columns["time"] - self.time[begin]})
 
     def save(self, path: str | Path) -> None:
         """Write everything to one ``.npz`` file, whole or not at all."""

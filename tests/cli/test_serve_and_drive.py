@@ -15,11 +15,11 @@ from motion_cueing.cli.evaluate import EvaluateCommand, make_plan
 from motion_cueing.cli.main import main
 from motion_cueing.cli.serve import DriveCommand, ServeCommand
 from motion_cueing.evaluation import Trajectory
-from motion_cueing.evaluation.suite import run_suite
+from motion_cueing.evaluation.suite import load_drives, run_suite
 from motion_cueing.realtime.report import SCHEMA, LoopReport
 from motion_cueing.realtime.server import Server
 
-from ..realtime.bench import Bench, lane_change
+from ..realtime.bench import PAPER, Bench, lane_change
 
 pytestmark = pytest.mark.slow
 
@@ -77,8 +77,39 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, ending, t
     assert np.abs(logged.f_reference[:, 1]).max() > 0.0
     plan = make_plan(EvaluateCommand(replays=(log,), out=tmp_path / "out"), ["motion-cueing evaluate"])
     outcome = run_suite(plan.maneuvers, plan.policies, lambda maneuver, drives: None)
+    assert list(outcome.maneuvers) == ["log"]
     assert list(outcome.maneuvers["log"]) == ["driven"]
+    assert "did not move the machine" in plan.skipped["log.npz"]
     assert outcome.maneuvers["log"]["driven"].cue_error > 0.0
+
+
+def test_only_what_the_policy_moved_is_scored(tmp_path):
+    bench = Bench()
+    for seconds in (2.0, 1.0):
+        bench.wait(0.5)
+        bench.drive(lane_change(seconds))
+        bench.settle(cues=False)
+    bench.trajectory().save(tmp_path / "twice.npz")
+    drives, left_out = load_drives([tmp_path / "twice.npz"], PAPER)
+    assert list(drives) == ["twice", "twice-2"]
+    followed = sum(setpoint.state.follows for setpoint in bench.setpoints)
+    assert sum(map(len, drives.values())) == followed
+    rest = 0.01 * (len(bench.setpoints) - followed)
+    assert left_out["twice.npz"].startswith(f"{rest:.1f} s ")
+    for seconds, drive in zip((2.0, 1.0), drives.values(), strict=True):
+        trace = lane_change(seconds)
+        assert drive.time[0] == 0.0
+        np.testing.assert_array_equal(drive.f_reference[: len(trace)], trace.specific_force)
+        # The last cues are held for a moment; then it brakes, which is not in it.
+        np.testing.assert_array_equal(drive.f_reference[len(trace) :] - trace.specific_force[-1], 0.0)
+
+
+def test_a_log_in_which_nothing_moved_is_refused(tmp_path, capsys):
+    bench = Bench()
+    bench.wait(0.5)
+    bench.trajectory().save(tmp_path / "still.npz")
+    assert main(["evaluate", "--replays", str(tmp_path / "still.npz"), "--out", str(tmp_path / "out")]) == 2
+    assert "never moved the machine" in capsys.readouterr().err
 
 
 def test_a_replay_needs_its_own_machine_and_cues(tmp_path, capsys):
