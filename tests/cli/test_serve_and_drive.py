@@ -16,10 +16,13 @@ from motion_cueing.cli.main import main
 from motion_cueing.cli.serve import DriveCommand, ServeCommand
 from motion_cueing.evaluation import Trajectory
 from motion_cueing.evaluation.suite import load_drives, run_suite
+from motion_cueing.realtime import SetPoint, State
+from motion_cueing.realtime.client import Client
+from motion_cueing.realtime.packets import NO_SEQUENCE
 from motion_cueing.realtime.report import SCHEMA, LoopReport
 from motion_cueing.realtime.server import Server
 
-from ..realtime.bench import PAPER, Bench, lane_change
+from ..realtime.bench import FLOATS, PAPER, Bench, lane_change
 
 pytestmark = pytest.mark.slow
 
@@ -71,7 +74,13 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, ending, t
     answers = LoopReport.load_json(driven).packets
     assert answers["received"] > 0
     assert answers["malformed"] == answers["outside_limits"] == 0
-    assert f"UDP 127.0.0.1:{port}" in capsys.readouterr().out
+    shown = capsys.readouterr()
+    assert f"UDP 127.0.0.1:{port}" in shown.out
+    assert "outside the machine's limits: 0" in shown.out
+    assert shown.err.count("returns to neutral") == 1
+    # The log is not written over, and nothing listens before that is said.
+    assert main(["serve", "--policy", policy, "--port", str(port), "--log", str(log)]) == 2
+    assert "is there already" in capsys.readouterr().err
     logged = Trajectory.load(log)
     assert len(logged) == sum(report.states.values())
     assert np.abs(logged.f_reference[:, 1]).max() > 0.0
@@ -170,6 +179,24 @@ def test_drive_fails_where_nobody_answers(tmp_path, capsys):
     words = ["drive", "--maneuver", str(tmp_path / "lane.csv"), "--to", f"127.0.0.1:{free_port()}"]
     assert main([*words, "--rate", "100", "--after", "0"]) == 1
     assert "nothing came back" in capsys.readouterr().err
+
+
+def test_drive_says_that_the_machine_still_braked(tmp_path, capsys, monkeypatch):
+    lane_change(0.1).to_csv(tmp_path / "lane.csv")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as controller:
+        controller.bind(("127.0.0.1", 0))
+        run = Client.run
+
+        def answered(self, cues, stops):
+            # What this client listens at is known to it alone until it sends.
+            motion = SetPoint(State.BRAKING, 0, NO_SEQUENCE, 0.0, 0.0, 0.0, np.zeros(39))
+            controller.sendto(FLOATS.pack_setpoint(motion), ("127.0.0.1", self._endpoint.address[1]))
+            run(self, cues, stops)
+
+        monkeypatch.setattr(Client, "run", answered)
+        words = ["drive", "--maneuver", str(tmp_path / "lane.csv"), "--rate", "100", "--after", "0", "--to"]
+        assert main([*words, f"127.0.0.1:{controller.getsockname()[1]}"]) == 0
+    assert "100.0% of the set-points came from a machine that braked" in capsys.readouterr().err
 
 
 def test_beyond_this_machine_is_announced(capsys):
