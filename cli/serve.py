@@ -308,7 +308,7 @@ def _finish_drive(command: DriveCommand, client: Client, endpoint: Endpoint) -> 
     print(f"set-points outside the machine's limits: {client.counts['outside_limits']}")
     if client.braking:
         print(
-            f"{client.braking:.1%} of the set-points came from a machine that braked, although cues were sent: "
+            f"{client.braking:.1%} of the set-points came from a machine that braked while cues were sent: "
             "it was not yet back from an earlier drive, or packets were late; wait until it is in neutral "
             "(about 10 s), and drive again",
             file=sys.stderr,
