@@ -202,9 +202,13 @@ class Trajectory:
         return np.column_stack([self.carriage, self.legs, self.turntable])
 
     def part(self, begin: int, end: int) -> Trajectory:
-        """The rows from ``begin`` to before ``end``; time starts at 0 again."""
-        columns: dict[str, Any] = {name: getattr(self, name)[begin:end] for name in _COLUMNS}
-        return replace(self, **{**columns, "time": columns["time"] - self.time[begin]})
+        """The rows from ``begin`` to before ``end``; its first row is a start, at time 0."""
+        columns: dict[str, Any] = {name: getattr(self, name)[begin:end].copy() for name in _COLUMNS}
+        columns["time"] -= self.time[begin]
+        for name in ("action", "applied"):
+            columns[name][0] = 0.0
+        columns["step_time"][0] = np.nan
+        return replace(self, **columns)
 
     def save(self, path: str | Path) -> None:
         """Write everything to one ``.npz`` file, whole or not at all."""

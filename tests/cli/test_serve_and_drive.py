@@ -14,8 +14,8 @@ from motion_cueing.cli import serve as serve_command
 from motion_cueing.cli.evaluate import EvaluateCommand, make_plan
 from motion_cueing.cli.main import main
 from motion_cueing.cli.serve import DriveCommand, ServeCommand
-from motion_cueing.evaluation import Trajectory
-from motion_cueing.evaluation.suite import load_drives, run_suite
+from motion_cueing.evaluation import Trajectory, measure, rollout
+from motion_cueing.evaluation.suite import cues_of, load_drives, run_suite
 from motion_cueing.realtime import SetPoint, State
 from motion_cueing.realtime.client import Client
 from motion_cueing.realtime.packets import NO_SEQUENCE
@@ -105,6 +105,10 @@ def test_only_what_the_policy_moved_is_scored(tmp_path):
     assert sum(map(len, drives.values())) == followed
     rest = 0.01 * (len(bench.setpoints) - followed)
     assert left_out["twice.npz"].startswith(f"{rest:.1f} s ")
+    # The same policy on the same cues from the same start is the same drive.
+    again = rollout(bench.policy, cues_of(drives["twice"], "again"))
+    np.testing.assert_array_equal(again.f_simulator, drives["twice"].f_simulator)
+    assert measure(again).cue_error == measure(drives["twice"]).cue_error
     for seconds, drive in zip((2.0, 1.0), drives.values(), strict=True):
         trace = lane_change(seconds)
         assert drive.time[0] == 0.0
