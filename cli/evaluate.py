@@ -75,7 +75,7 @@ class Plan:
         policies: Drives by label.
         out: Folder of the output.
         arguments: The command line.
-        skipped: Policies of the benchmark that cannot be driven here, and why.
+        skipped: Policies of the benchmark that cannot be driven here, and why; what is left out of a replay.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -171,11 +171,11 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     platform, car = arguments.find_platform(command.platform), arguments.find_car(command.car)
     if command.replays and command.maneuvers != EvaluateCommand().maneuvers:
         raise ConfigurationError("--replays have their own cues; leave --maneuvers out")
-    recorded = load_drives(command.replays, platform)
+    recorded, skipped = load_drives(command.replays, platform)
     drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
-    skipped: dict[str, str] = {}
     if command.policies or not recorded:
-        policies, skipped = arguments.make_policies(command.policies, platform)
+        policies, missing = arguments.make_policies(command.policies, platform)
+        skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
         maneuvers=cue_sources(recorded) if recorded else arguments.find_maneuvers(command.maneuvers, car),

@@ -74,7 +74,7 @@ class ServeCommand:
     priority: Whole | None = None
     """Real-time priority (SCHED_FIFO), 1 to 99; needs the right to it."""
     log: Annotated[Path | None, option("FILE.npz")] = None
-    """Trajectory to write, for `motion-cueing evaluate --replays`."""
+    """Trajectory to write, a new file, for `motion-cueing evaluate --replays`."""
     report: Annotated[Path | None, option("FILE.json")] = None
     """Counts and timings to write."""
 
@@ -158,6 +158,8 @@ def _check(command: ServeCommand) -> None:
     for flag, file in (("--log", command.log), ("--report", command.report)):
         if file is not None:
             check_file(flag, file)
+    if command.log is not None and command.log.exists():
+        raise ConfigurationError(f"--log {command.log} is there already; move it away, or name another file")
 
 
 def _made(command: ServeCommand) -> _Served:
@@ -208,11 +210,20 @@ def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
     from ..realtime.timing import undisturbed
 
     interrupt, limit = Interrupt(), command.duration
+    stopping = False
+
+    def ends(seconds: float) -> bool:
+        nonlocal stopping
+        if not stopping and (interrupt.asked or (limit is not None and seconds >= limit)):
+            stopping = True
+            print("stopping: the machine brakes and returns to neutral ...", file=sys.stderr, flush=True)
+        return stopping
+
     with interrupt.caught(), _terminated_gently(), undisturbed(command.cpu, command.priority):
         # Whoever reads it may stop the controller at once.
         _announce(command, endpoint)
         try:
-            server.run(lambda seconds: interrupt.asked or (limit is not None and seconds >= limit))
+            server.run(ends)
         except KeyboardInterrupt:
             print("stopped before the machine was home", file=sys.stderr)
 
@@ -294,4 +305,12 @@ def _finish_drive(command: DriveCommand, client: Client, endpoint: Endpoint) -> 
         faults=client.faults,
     )
     show(report, "set-points", command.report)
+    print(f"set-points outside the machine's limits: {client.counts['outside_limits']}")
+    if client.braking:
+        print(
+            f"{client.braking:.1%} of the set-points came from a machine that braked while cues were sent: "
+            "it was not yet back from an earlier drive, or packets were late; wait until it is in neutral "
+            "(about 10 s), and drive again",
+            file=sys.stderr,
+        )
     return 1 if client.counts["outside_limits"] else 0

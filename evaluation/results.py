@@ -206,7 +206,7 @@ class Results(Saved):
         failures: Drives without a result.
         criteria: The thresholds the metrics were measured with.
         normalized_scores: By maneuver and policy.
-        skipped: Requested policies that cannot be driven here, and why.
+        skipped: Requested policies that cannot be driven here, and why; by file, what is left out of a log.
         notes: Counts of the policies, such as solves without a solution, by maneuver and policy.
     """
 

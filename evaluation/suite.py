@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from rich.console import Console
 
 from ..envs.cues import CueTrace
-from ..envs.errors import ConfigurationError, MotionCueingError, summary
+from ..envs.errors import ConfigurationError, DataError, MotionCueingError, summary
 from .metrics import Criteria, Metrics, measure
 from .reporting.text import how_many, print_note
 from .results import Failure
@@ -186,30 +187,56 @@ def print_troubles(console: Console, notes: Iterable[tuple[str, str, Mapping[str
         print_note(console, "counted", f"{policy}: {line}")
 
 
+FOLLOWED: Final = "loop_followed"
+"""Metadata of a controller's log: first row and end of each stretch that the policy moved, as JSON."""
+
 DRIVEN: Final = "driven"
 """What the recorded drive is called beside policies that drive the same cues."""
 
 
-def load_drives(files: Sequence[Path], platform: Platform) -> dict[str, Trajectory]:
-    """Recorded drives by label: the names of their files.
+def load_drives(files: Sequence[Path], platform: Platform) -> tuple[dict[str, Trajectory], dict[str, str]]:
+    """Recorded drives by label (the names of their files), and what is left out of them.
+
+    The log of a controller has waiting and braking in it, which the policy did not decide. Each stretch that
+    the policy moved becomes a drive of its own, numbered from the second on.
 
     Args:
         files: Saved trajectories.
         platform: The machine they must have been driven on.
 
     Raises:
-        DataError: a file is missing, broken or no trajectory.
+        DataError: a file is missing, broken or no trajectory, or the log of a machine that never moved.
         ConfigurationError: a drive is of another machine.
     """
-    names = labels([str(file) for file in files], [file.stem for file in files])
-    drives = {label: Trajectory.load(name) for name, label in names.items()}
-    for label, drive in drives.items():
+    drives: dict[str, Trajectory] = {}
+    stems: dict[str, str] = {}
+    left_out: dict[str, str] = {}
+    for file in dict.fromkeys(files):
+        drive = Trajectory.load(file)
         if drive.platform != platform.name:
             raise ConfigurationError(
-                f"{label} was driven on the motion base {drive.platform!r}, not {platform.name!r}; "
+                f"{file.stem} was driven on the motion base {drive.platform!r}, not {platform.name!r}; "
                 "name it with --platform"
             )
-    return drives
+        stretches = _followed(drive, file)
+        rest = len(drive) - sum(end - begin for begin, end in stretches)
+        if rest:
+            left_out[file.name] = f"{rest * drive.dt:.1f} s in which the policy did not move the machine"
+        for begin, end in stretches:
+            name = f"{file} from {begin}"
+            drives[name], stems[name] = drive.part(begin, end), file.stem
+    names = labels([*stems], [*stems.values()])
+    return {label: drives[name] for name, label in names.items()}, left_out
+
+
+def _followed(drive: Trajectory, file: Path) -> list[tuple[int, int]]:
+    """First row and end of each stretch that the policy moved, those of a single row left out."""
+    if FOLLOWED not in drive.metadata:
+        return [(0, len(drive))]
+    stretches = [(begin, end) for begin, end in json.loads(drive.metadata[FOLLOWED]) if end - begin > 1]
+    if not stretches:
+        raise DataError(f"{file}: the policy never moved the machine in it; send cues to the controller")
+    return stretches
 
 
 def cue_sources(drives: Mapping[str, Trajectory]) -> dict[str, CueSource]:

@@ -7,7 +7,7 @@ import json
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -200,6 +200,15 @@ class Trajectory:
     def positions(self) -> Floats:
         """(n, 9) positions of the :data:`ACTUATORS`, m and rad."""
         return np.column_stack([self.carriage, self.legs, self.turntable])
+
+    def part(self, begin: int, end: int) -> Trajectory:
+        """The rows from ``begin`` to before ``end``; its first row is a start, at time 0."""
+        columns: dict[str, Any] = {name: getattr(self, name)[begin:end].copy() for name in _COLUMNS}
+        columns["time"] -= self.time[begin]
+        for name in ("action", "applied"):
+            columns[name][0] = 0.0
+        columns["step_time"][0] = np.nan
+        return replace(self, **columns)
 
     def save(self, path: str | Path) -> None:
         """Write everything to one ``.npz`` file, whole or not at all."""

@@ -124,6 +124,7 @@ class Client:
         pace: Of the packets.
         periods: In which packets were due.
         duration: Of the run, s.
+        braking: Share of the run's set-points that came while the machine braked.
     """
 
     def __init__(
@@ -144,7 +145,7 @@ class Client:
         self.faults: list[str] = []
         self.pace = Pace(rate)
         self.periods = 0
-        self.duration = 0.0
+        self.duration = self.braking = 0.0
         self._last = -1
         self._echo = -1
 
@@ -163,6 +164,7 @@ class Client:
             self.periods += 1
             pace.done()
         self.duration = _NS * (time.perf_counter_ns() - begin)
+        self.braking = self.states[State.BRAKING] / max(self.counts["received"], 1)
 
     def listen(self, seconds: float) -> None:
         """Receive set-points for a while."""

@@ -8,6 +8,7 @@ Policies act every 10 ms, as in an evaluation. Set-points within such a time ste
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from typing import Any, Final
@@ -24,7 +25,7 @@ from ..envs.platform import Platform
 from ..envs.settings import configuration
 from ..envs.simulator.simulator import TIME_STEP
 from ..evaluation.rollout import Rollout, record, trajectory_of
-from ..evaluation.suite import explain
+from ..evaluation.suite import FOLLOWED, explain
 from ..evaluation.trajectory import Trajectory
 from .inbox import Inbox
 from .machine import AT_REST, LiveMachine, Track
@@ -73,8 +74,17 @@ class LoopLog:
         """(n,) state in each time step."""
         return np.asarray(self.rows["state"])
 
+    @property
+    def followed(self) -> list[tuple[int, int]]:
+        """First row and end of each stretch in which the policy moved the machine."""
+        moves = np.isin(self.states, [state for state in State if state.follows])
+        edges = np.flatnonzero(np.diff(moves, prepend=False, append=False))
+        return [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
+
     def trajectory(self, platform: Platform, start: ArrayLike, vestibular: str, policy: Any) -> Trajectory:
         """The drive as a trajectory: its time steps are simulated again, with the same accelerations.
+
+        Every step is in it. The metadata name those that the policy moved, which alone are scored.
 
         Args:
             platform: The machine.
@@ -95,7 +105,7 @@ class LoopLog:
         return replace(
             trajectory,
             step_time=np.append(math.nan, rows["seconds"][:-1]),
-            metadata={**trajectory.metadata, **steps},
+            metadata={**trajectory.metadata, **steps, FOLLOWED: json.dumps(self.followed)},
         )
 
 

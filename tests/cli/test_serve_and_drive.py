@@ -14,12 +14,15 @@ from motion_cueing.cli import serve as serve_command
 from motion_cueing.cli.evaluate import EvaluateCommand, make_plan
 from motion_cueing.cli.main import main
 from motion_cueing.cli.serve import DriveCommand, ServeCommand
-from motion_cueing.evaluation import Trajectory
-from motion_cueing.evaluation.suite import run_suite
+from motion_cueing.evaluation import Trajectory, measure, rollout
+from motion_cueing.evaluation.suite import cues_of, load_drives, run_suite
+from motion_cueing.realtime import SetPoint, State
+from motion_cueing.realtime.client import Client
+from motion_cueing.realtime.packets import NO_SEQUENCE
 from motion_cueing.realtime.report import SCHEMA, LoopReport
 from motion_cueing.realtime.server import Server
 
-from ..realtime.bench import Bench, lane_change
+from ..realtime.bench import FLOATS, PAPER, Bench, lane_change
 
 pytestmark = pytest.mark.slow
 
@@ -71,14 +74,55 @@ def test_a_drive_over_the_loopback_leaves_log_and_report(form, policy, ending, t
     answers = LoopReport.load_json(driven).packets
     assert answers["received"] > 0
     assert answers["malformed"] == answers["outside_limits"] == 0
-    assert f"UDP 127.0.0.1:{port}" in capsys.readouterr().out
+    shown = capsys.readouterr()
+    assert f"UDP 127.0.0.1:{port}" in shown.out
+    assert "outside the machine's limits: 0" in shown.out
+    assert shown.err.count("returns to neutral") == 1
+    # The log is not written over, and nothing listens before that is said.
+    assert main(["serve", "--policy", policy, "--port", str(port), "--log", str(log)]) == 2
+    assert "is there already" in capsys.readouterr().err
     logged = Trajectory.load(log)
     assert len(logged) == sum(report.states.values())
     assert np.abs(logged.f_reference[:, 1]).max() > 0.0
     plan = make_plan(EvaluateCommand(replays=(log,), out=tmp_path / "out"), ["motion-cueing evaluate"])
     outcome = run_suite(plan.maneuvers, plan.policies, lambda maneuver, drives: None)
+    assert list(outcome.maneuvers) == ["log"]
     assert list(outcome.maneuvers["log"]) == ["driven"]
+    assert "did not move the machine" in plan.skipped["log.npz"]
     assert outcome.maneuvers["log"]["driven"].cue_error > 0.0
+
+
+def test_only_what_the_policy_moved_is_scored(tmp_path):
+    bench = Bench()
+    for seconds in (2.0, 1.0):
+        bench.wait(0.5)
+        bench.drive(lane_change(seconds))
+        bench.settle(cues=False)
+    bench.trajectory().save(tmp_path / "twice.npz")
+    drives, left_out = load_drives([tmp_path / "twice.npz"], PAPER)
+    assert list(drives) == ["twice", "twice-2"]
+    followed = sum(setpoint.state.follows for setpoint in bench.setpoints)
+    assert sum(map(len, drives.values())) == followed
+    rest = 0.01 * (len(bench.setpoints) - followed)
+    assert left_out["twice.npz"].startswith(f"{rest:.1f} s ")
+    # The same policy on the same cues from the same start is the same drive.
+    again = rollout(bench.policy, cues_of(drives["twice"], "again"))
+    np.testing.assert_array_equal(again.f_simulator, drives["twice"].f_simulator)
+    assert measure(again).cue_error == measure(drives["twice"]).cue_error
+    for seconds, drive in zip((2.0, 1.0), drives.values(), strict=True):
+        trace = lane_change(seconds)
+        assert drive.time[0] == 0.0
+        np.testing.assert_array_equal(drive.f_reference[: len(trace)], trace.specific_force)
+        # The last cues are held for a moment; then it brakes, which is not in it.
+        np.testing.assert_array_equal(drive.f_reference[len(trace) :] - trace.specific_force[-1], 0.0)
+
+
+def test_a_log_in_which_nothing_moved_is_refused(tmp_path, capsys):
+    bench = Bench()
+    bench.wait(0.5)
+    bench.trajectory().save(tmp_path / "still.npz")
+    assert main(["evaluate", "--replays", str(tmp_path / "still.npz"), "--out", str(tmp_path / "out")]) == 2
+    assert "never moved the machine" in capsys.readouterr().err
 
 
 def test_a_replay_needs_its_own_machine_and_cues(tmp_path, capsys):
@@ -139,6 +183,24 @@ def test_drive_fails_where_nobody_answers(tmp_path, capsys):
     words = ["drive", "--maneuver", str(tmp_path / "lane.csv"), "--to", f"127.0.0.1:{free_port()}"]
     assert main([*words, "--rate", "100", "--after", "0"]) == 1
     assert "nothing came back" in capsys.readouterr().err
+
+
+def test_drive_says_that_the_machine_still_braked(tmp_path, capsys, monkeypatch):
+    lane_change(0.1).to_csv(tmp_path / "lane.csv")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as controller:
+        controller.bind(("127.0.0.1", 0))
+        run = Client.run
+
+        def answered(self, cues, stops):
+            # What this client listens at is known to it alone until it sends.
+            motion = SetPoint(State.BRAKING, 0, NO_SEQUENCE, 0.0, 0.0, 0.0, np.zeros(39))
+            controller.sendto(FLOATS.pack_setpoint(motion), ("127.0.0.1", self._endpoint.address[1]))
+            run(self, cues, stops)
+
+        monkeypatch.setattr(Client, "run", answered)
+        words = ["drive", "--maneuver", str(tmp_path / "lane.csv"), "--rate", "100", "--after", "0", "--to"]
+        assert main([*words, f"127.0.0.1:{controller.getsockname()[1]}"]) == 0
+    assert "100.0% of the set-points came from a machine that braked" in capsys.readouterr().err
 
 
 def test_beyond_this_machine_is_announced(capsys):

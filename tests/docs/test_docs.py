@@ -52,6 +52,7 @@ FOLDERS = (
 _FEW = 'episode={"library": 2, "drive_duration": 22.0}'
 SMALL = {
     "4_000_000": "2_000",
+    "random_drives(24, 60.0": "random_drives(2, 22.0",
     'gymnasium.make("motion_cueing/CueingPreview-v0")': (
         f'gymnasium.make("motion_cueing/CueingPreview-v0", {_FEW})'
     ),

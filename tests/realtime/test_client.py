@@ -70,6 +70,24 @@ def test_what_exceeds_a_limit_is_told(where, value, told):
     assert told in check(still(1, one=(where, value)))
 
 
+def test_the_client_knows_how_much_came_while_the_machine_braked():
+    here, there = Endpoint(("127.0.0.1", 0)), Endpoint(("127.0.0.1", 0))
+    client = Client(here, there.address, FLOATS, PAPER, 1000, NetworkFaults(0, 0, 0, 0, 0))
+    braking = [still(k)._replace(state=State.BRAKING) for k in range(6)]
+    for setpoint in (*braking[:3], still(3)):
+        there.send(FLOATS.pack_setpoint(setpoint), here.address)
+    client.run(cues_at(lane_change(0.1), 100, 1), lambda: False)
+    assert client.braking == 0.75
+    # Silence makes any machine brake.
+    for setpoint in braking[4:]:
+        there.send(FLOATS.pack_setpoint(setpoint), here.address)
+    client.listen(0.0)
+    assert client.states[State.BRAKING] == 5
+    assert client.braking == 0.75
+    here.close()
+    there.close()
+
+
 def test_the_client_counts_what_is_wrong():
     here, there = Endpoint(("127.0.0.1", 0)), Endpoint(("127.0.0.1", 0))
     client = Client(here, there.address, FLOATS, PAPER, 1000, NetworkFaults(0, 0, 0, 0, 0))
