@@ -31,6 +31,10 @@ TILTS_MORE = {
         },
         {"steady-turn", "braking", "acceleration", "step-steer", "stop-and-go"},
     ),
+    "learned-ppo-now": (
+        {"braking", "acceleration", "obstacle-avoidance", "roundabout", "stop-and-go"},
+        {"steady-turn", "step-steer"},
+    ),
 }
 """Where an agent misses the bar, as docs/results/agents.md says: drives with a larger tilt rate than the
 tuned washout's, and with a large one for longer."""
