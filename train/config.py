@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -234,10 +235,11 @@ def load_config(algo: str | None, path: Path | None = None, **fields: Any) -> Tr
         raise ConfigurationError(f"--algorithm is missing; use one of {', '.join(algorithm_names())}")
     default = preset_of(str(name))
     preset = {} if default is None else _fields(default)
-    for key, name_of in _WHOLE.items():
-        if name_of in (given.get(key) or {}):
-            preset = {name: value for name, value in preset.items() if name != key}
     chosen = {key: value for key, value in fields.items() if value is not None}
+    for key, entry in _WHOLE.items():
+        values = (given.get(key), chosen.get(key))
+        if any(isinstance(value, Mapping) and entry in value for value in values):
+            preset = {name: value for name, value in preset.items() if name != key}
     merged = merge(merge(preset, given), {"algo": name, **chosen})
     if "search" in given:
         # What is varied is meant as a whole.

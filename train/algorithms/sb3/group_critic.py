@@ -1,8 +1,8 @@
 """A critic that knows how a machine differs from the others in its group; for PPO and TRPO.
 
-In a group the reward is relative to the others', so the road tells nothing about what is still to come: where
-this machine is, and the others are not, does. The critic sees that beside the observation, and the actor the
-observation alone, which is all there is where it is used (an asymmetric critic).
+In a group the reward is relative to the others'. So the road says little about what is still to come, and the
+difference of a machine from the others says much. The critic sees both. The actor sees the observation alone,
+which is all there is where the agent is used: an asymmetric critic.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class _ActorSeesHalf(MlpExtractor):
 
 
 class _TwoRates(torch.optim.Adam):
-    """Adam whose second group of parameters has a learning rate of its own, whatever is set for all."""
+    """Adam with a learning rate of its own for the second group; Stable-Baselines3 sets one for all."""
 
     second_rate: float
 

@@ -304,7 +304,9 @@ class SB3Learner(Learner):
     @classmethod
     def advice(cls, config: TrainingConfig) -> list[str]:
         """Reasons why a configuration will hardly learn."""
-        return advice(config, CLASSES[config.algo])
+        algorithm = CLASSES[config.algo]
+        arguments(algorithm, config.hyperparameters, 1)
+        return advice(config, algorithm)
 
     def state(self) -> dict[str, Any]:
         """Weights, optimizers, replay buffer, normalization, environments, random generators, log."""

@@ -20,7 +20,7 @@ def advice(algo: str, task: dict | None = None, **fields) -> list[str]:
     return ALGORITHMS[algo].advice(config)
 
 
-LONG = {"gamma": 0.999, "gae_lambda": 0.99, "n_steps": 8, "batch_size": 8}
+LONG = {"policy": "MlpPolicy", "gamma": 0.999, "gae_lambda": 0.99, "n_steps": 8, "batch_size": 8}
 
 
 def test_a_sound_configuration_is_not_commented():
@@ -44,6 +44,13 @@ def test_a_gaussian_wider_than_the_bound_is_told_and_a_hopeless_one_refused():
     bound = {"action": {"bound": 10.0}}
     assert advice("ppo", task=bound, hyperparameters={**wide, "policy_kwargs": {"log_std_init": 1.0}}) == []
     assert advice("ppo", hyperparameters={**hopeless, "use_sde": True}) == []
+
+
+def test_the_noise_that_is_annealed_counts_and_one_that_cannot_be_is_refused():
+    (sentence,) = advice("ppo", hyperparameters={**LONG, "annealed_std": [2.0, 0.1]})
+    assert "62 % of actions lie beyond" in sentence
+    with pytest.raises(ConfigurationError, match="annealed_std"):
+        advice("ppo", hyperparameters={**LONG, "annealed_std": 0.5})
 
 
 @pytest.mark.parametrize(
