@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +26,7 @@ from .signals import (
     on_grid,
     read_log,
 )
+from .timing import in_order
 
 SPEED_CUTOFF_HZ: Final = 1.0
 """Cut-off of the speed channel, Hz: satellite and wheel speeds come in steps of about a tenth of a second."""
@@ -40,12 +41,14 @@ class Findings:
         device: Mounting, biases and correlations.
         speed_delay: How long the speed lags behind the force, s.
         gravity: Gravity as the device measures it, m/s^2.
+        changes: What was mended in the log, by choice.
     """
 
     timing: Timing
     device: Estimate
     speed_delay: float
     gravity: float
+    changes: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """A report for people, angles in degrees."""
@@ -65,6 +68,7 @@ class Findings:
             f"f_x with dv/dt     correlation {d.force_speed:.3f}",
             f"f_y with v r       correlation {d.force_turn:.3f}",
             f"heading, course    correlation {course}",
+            *(f"changed            {change}" for change in self.changes),
             *(f"note               {note}" for note in d.notes),
         ]
 
@@ -114,11 +118,12 @@ def import_log(
         DataError: the log is broken, or does not show what has to be estimated.
     """
     options = options or ImportOptions()
-    log = _cut(read_log(path, columns, units or {}), options)
+    log, changes = in_order(read_log(path, columns, units or {}), options)
+    log = _cut(log, options)
     series, timing = close_gaps(log, options)
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
     raw = {signal: on_grid(values, grid) for signal, values in series.items()}
-    findings = _find(raw, grid, timing, options)
+    findings = _find(raw, grid, timing, changes, options)
     return ImportedLog(
         trace=_trace(name or Path(path).stem, str(Path(path).name), raw, grid, findings, options),
         findings=findings,
@@ -127,7 +132,9 @@ def import_log(
     )
 
 
-def _find(raw: Mapping[str, Floats], grid: Grid, timing: Timing, options: ImportOptions) -> Findings:
+def _find(
+    raw: Mapping[str, Floats], grid: Grid, timing: Timing, changes: list[str], options: ImportOptions
+) -> Findings:
     evidence = gather(
         grid.rate_hz,
         _stacked(raw, FORCES),
@@ -139,7 +146,7 @@ def _find(raw: Mapping[str, Floats], grid: Grid, timing: Timing, options: Import
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
     device = estimate(evidence.delayed(delay), options)
     gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
-    return Findings(timing, device, delay, gravity)
+    return Findings(timing, device, delay, gravity, tuple(changes))
 
 
 def _trace(
@@ -179,7 +186,7 @@ def _cut(log: RawLog, options: ImportOptions) -> RawLog:
     signals = {name: values[keep] for name, values in log.signals.items()}
     if "course" in signals:
         signals["course"] = _unwrapped(signals["course"])
-    return RawLog(log.time[keep], signals, log.rows[keep], log.time_unit)
+    return replace(log, time=log.time[keep], signals=signals, rows=log.rows[keep])
 
 
 def _unwrapped(course: Floats) -> Floats:

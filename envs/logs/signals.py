@@ -41,6 +41,9 @@ class ImportOptions:
     gaps: Literal["refuse", "bridge"] = "refuse"
     """Refuse missing data (long steps, repeated stamps, empty cells), or bridge it by interpolation."""
 
+    clock: Literal["refuse", "mend"] = "refuse"
+    """Refuse a clock that wraps (a day, 32 bits of us), or mend it: unwrap its stamps."""
+
     longest_step_s: Positive = 0.2
     """A longer step between samples is a gap, s."""
 
@@ -116,12 +119,14 @@ class RawLog:
         signals: Each (n,), SI units, device axes; NaN where a cell was empty.
         rows: (n,) number of each data row in the file, from 1, for messages.
         time_unit: Of the time column, for messages.
+        first_stamp_s: First stamp as the log counts it, s.
     """
 
     time: Floats
     signals: Mapping[str, Floats]
     rows: NDArray[np.intp]
     time_unit: str = "s"
+    first_stamp_s: float = 0.0
 
 
 def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -173,9 +178,10 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
     if not np.any(np.isfinite(stamps)):
         raise DataError(f"{path}: column {columns['time']} holds no time stamp")
     # Subtracting before scaling keeps the digits of stamps counted from 1970.
-    time = (stamps - stamps[np.isfinite(stamps)][0]) * factors["time"]
+    first = float(stamps[np.isfinite(stamps)][0])
+    time = (stamps - first) * factors["time"]
     signals = {name: signal(name) for name in columns if name != "time"}
-    return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"))
+    return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"), first * factors["time"])
 
 
 def _factors(columns: Mapping[str, str], units: Mapping[str, str]) -> dict[str, float]:
