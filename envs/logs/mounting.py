@@ -80,6 +80,12 @@ LONGEST_DELAY_S: Final = 2.0
 """Delay of a speed (satellite receivers average) searched for, s."""
 
 _DELAY_STEP_S: Final = 0.02
+_LEAST_SPEED_RATE: Final = 0.25
+"""Standard deviation of dv/dt below which it is noise, and shows no delay, m/s^2."""
+
+_LEAST_COURSE_RATE: Final = 0.02
+"""The same of the rate of the course, rad/s."""
+
 _WEAK_FIT: Final = 0.1
 """Share of the variance of dv/dt that the force must explain before a delay is believed."""
 
@@ -154,16 +160,25 @@ def shift(values: Floats, delay: float, dt: float) -> Floats:
 
 
 def speed_delay(evidence: Evidence) -> float:
-    """How long the speed lags behind the force, s: where the force explains most of dv/dt.
+    """How long speed and course lag behind force and rates, s.
 
-    The forward axis is not known yet, so dv/dt is regressed on all three axes.
+    The forward axis is not known yet, so dv/dt is regressed on all three axes of the force. At constant
+    speed, the rate of the course is regressed on all three axes of the rates. A signal that hardly varies
+    shows no delay.
     """
-    if evidence.speed is None:
-        return 0.0
-    regressors = np.column_stack([evidence.force, np.ones(len(evidence.force))])
-    basis = np.linalg.qr(regressors)[0]
+    if evidence.speed is not None and evidence.speed_rate.std() >= _LEAST_SPEED_RATE:
+        return _best_delay(evidence.force, evidence.speed_rate, evidence.dt)
+    if evidence.course is not None:
+        turning = np.gradient(evidence.course, evidence.dt)
+        if turning.std() >= _LEAST_COURSE_RATE:
+            return _best_delay(evidence.rate, turning, evidence.dt)
+    return 0.0
+
+
+def _best_delay(axes: Floats, target: Floats, dt: float) -> float:
+    basis = np.linalg.qr(np.column_stack([axes, np.ones(len(axes))]))[0]
     delays = np.arange(0.0, LONGEST_DELAY_S + _DELAY_STEP_S / 2, _DELAY_STEP_S)
-    fits = [_explained(basis, shift(evidence.speed_rate, delay, evidence.dt)) for delay in delays]
+    fits = [_explained(basis, shift(target, delay, dt)) for delay in delays]
     best = int(np.argmax(fits))
     return float(delays[best]) if fits[best] > _WEAK_FIT else 0.0
 
@@ -248,7 +263,7 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
         force_speed=force_speed,
         force_turn=force_turn,
         rate_course=rate_course,
-        notes=_notes(mounting, rate_course, force_turn, options),
+        notes=_notes(mounting, rate_course, (force_speed, force_turn), evidence, options),
     )
 
 
@@ -258,15 +273,34 @@ def _rest(evidence: Evidence) -> tuple[Floats, Origin]:
         return evidence.force[evidence.still].mean(axis=0), "standstill"
     mean = evidence.force.mean(axis=0)
     turning = _turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
-    regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning])
+    # A car that leans by an angle in proportion to v r has a vertical force that varies with its square.
+    regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning, turning**2])
     return np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0], "average"
 
 
 def _turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
-    """The product v r (n,), without the bias of r as far as its mean shows it."""
+    """The product v r (n,), without the bias of r as far as the record shows it."""
     if evidence.speed is None:
         return np.zeros(len(yaw_rate))
-    return np.asarray(evidence.speed * (yaw_rate - yaw_rate.mean()))
+    return np.asarray(evidence.speed * (yaw_rate - _yaw_bias(evidence, yaw_rate)))
+
+
+def _yaw_bias(evidence: Evidence, yaw_rate: Floats) -> float:
+    """Bias of a yaw rate (n,) of unknown sense: at standstill, or as its drift against the course.
+
+    The mean is no bias: a drive may turn more one way than the other.
+    """
+    if evidence.still.sum() * evidence.dt >= _STILL_S:
+        return float(yaw_rate[evidence.still].mean())
+    if evidence.course is None:
+        return 0.0
+    heading = np.cumsum(yaw_rate) * evidence.dt
+    time = evidence.dt * np.arange(len(heading))
+    alike = correlation(_detrended(heading), _detrended(evidence.course))
+    # A course that is close to a straight line does not show the sense; the smaller bias is likelier.
+    senses = (1.0, -1.0) if abs(alike) < CLEAR else (float(np.sign(alike)),)
+    biases = [float(np.polyfit(time, heading - sense * evidence.course, 1)[0]) for sense in senses]
+    return min(biases, key=abs)
 
 
 def _rate_sign(evidence: Evidence, leveled: Mounting, choice: Sign) -> tuple[int, float | None]:
@@ -337,7 +371,12 @@ def _rate_bias(
     rate = mounting.rate_in_car(evidence.rate)
     if evidence.still.sum() * evidence.dt >= _STILL_S:
         return rate[evidence.still].mean(axis=0), ("standstill", "standstill")
-    bias = rate.mean(axis=0)
+    turning = _turn(evidence, rate[:, 2])
+    leaning = turning * (rate[:, 2] - _yaw_bias(evidence, rate[:, 2]))
+    # A car that leans in a turn has a pitch rate of r sin(roll), whose mean is no bias.
+    regressors = np.column_stack([np.ones(len(rate)), leaning])
+    pitch_bias = np.linalg.lstsq(regressors, rate[:, 1], rcond=None)[0][0]
+    bias = np.array([rate[:, 0].mean(), pitch_bias, rate[:, 2].mean()])
     if evidence.course is None:
         return np.array([bias[0], bias[1], 0.0]), ("average", "not estimated")
     drift = np.cumsum(rate[:, 2]) * evidence.dt - evidence.course
@@ -346,11 +385,19 @@ def _rate_bias(
 
 
 def _notes(
-    mounting: Mounting, rate_course: float | None, force_turn: float, options: ImportOptions
+    mounting: Mounting,
+    rate_course: float | None,
+    agreement: tuple[float, float],
+    evidence: Evidence,
+    options: ImportOptions,
 ) -> tuple[str, ...]:
     notes = []
-    if force_turn < CLEAR and options.lateral_sign == "estimate":
-        notes.append("too little turning to check the sense of the lateral axis; taken as right-handed")
+    for found, what in zip(agreement, ("change of speed", "turning"), strict=True):
+        if found < CLEAR and options.lateral_sign == "estimate":
+            notes.append(f"too little {what} to check the sense of the lateral axis; taken as right-handed")
+    standing = evidence.still.sum() * evidence.dt >= _STILL_S
+    if not standing and evidence.course is None and options.rate_bias_deg_s is None:
+        notes.append("neither standstill nor course: the bias of the yaw rate is taken as zero")
     if rate_course is None and options.rate_sign == "estimate":
         notes.append("no course: the sense of the rates is taken as it stands")
         if mounting.lateral_sign < 0:

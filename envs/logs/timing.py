@@ -1,4 +1,4 @@
-"""Clock of a log: its order is checked before anything is cut, and a clock that wraps is named or unwrapped."""
+"""Clock of a log: order is checked before anything is cut, and a wrap is named or unwrapped."""
 
 from __future__ import annotations
 

@@ -68,5 +68,5 @@ def test_swapped_segments_are_refused(tmp_path: Path, place: int, clock: str) ->
 def test_a_clock_that_begins_again_is_no_wrap(tmp_path: Path, offset: float) -> None:
     columns = table()
     columns["t"] = offset + np.where(columns["t"] < 40.0, columns["t"] + 7.0, columns["t"] - 40.0)
-    with pytest.raises(DataError, match="time runs backwards at data row 2001, .*; sort or split the log"):
+    with pytest.raises(DataError, match=r"time runs backwards at data row 2001, .*; sort or split the log"):
         imported(tmp_path, columns, "s", clock="mend")
