@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
-from .mounting import Estimate, estimate, gather, shift, speed_delay
+from .mounting import Estimate, Mounting, estimate, gather, shift, speed_delay
+from .plausibility import Slopes, check_fastest, check_gravity, check_slopes
 from .signals import (
     FORCES,
     RATES,
@@ -39,6 +41,7 @@ class Findings:
     Attributes:
         timing: Sample times and gaps.
         device: Mounting, biases and correlations.
+        slopes: How steeply force and heading follow speed and course.
         speed_delay: How long the speed lags behind the force, s.
         gravity: Gravity as the device measures it, m/s^2.
         changes: What was mended in the log, by choice.
@@ -46,6 +49,7 @@ class Findings:
 
     timing: Timing
     device: Estimate
+    slopes: Slopes
     speed_delay: float
     gravity: float
     changes: tuple[str, ...] = ()
@@ -68,6 +72,7 @@ class Findings:
             f"f_x with dv/dt     correlation {d.force_speed:.3f}",
             f"f_y with v r       correlation {d.force_turn:.3f}",
             f"heading, course    correlation {course}",
+            *self.slopes.lines(),
             *(f"changed            {change}" for change in self.changes),
             *(f"note               {note}" for note in d.notes),
         ]
@@ -123,7 +128,10 @@ def import_log(
     series, timing = close_gaps(log, options)
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
     raw = {signal: on_grid(values, grid) for signal, values in series.items()}
-    findings = _find(raw, grid, timing, changes, options)
+    if options.gravity == "add":
+        raw, options, change = _with_gravity(raw, options)
+        changes.append(change)
+    findings = _find(raw, grid, timing, changes, units or {}, options)
     return ImportedLog(
         trace=_trace(name or Path(path).stem, str(Path(path).name), raw, grid, findings, options),
         findings=findings,
@@ -132,8 +140,24 @@ def import_log(
     )
 
 
+def _with_gravity(
+    raw: Mapping[str, Floats], options: ImportOptions
+) -> tuple[dict[str, Floats], ImportOptions, str]:
+    """Signals with the force of gravity at the attitude given, or at none, which then holds."""
+    roll, pitch = options.roll_deg or 0.0, options.pitch_deg or 0.0
+    rest = Mounting(math.radians(roll), math.radians(pitch)).matrix.T @ [0.0, 0.0, -GRAVITY]
+    added = {name: raw[name] + rest[axis] for axis, name in enumerate(FORCES)}
+    change = f"gravity added, for a device at roll {roll:g}, pitch {pitch:g} deg"
+    return {**raw, **added}, replace(options, roll_deg=roll, pitch_deg=pitch), change
+
+
 def _find(
-    raw: Mapping[str, Floats], grid: Grid, timing: Timing, changes: list[str], options: ImportOptions
+    raw: Mapping[str, Floats],
+    grid: Grid,
+    timing: Timing,
+    changes: list[str],
+    units: Mapping[str, str],
+    options: ImportOptions,
 ) -> Findings:
     evidence = gather(
         grid.rate_hz,
@@ -143,10 +167,16 @@ def _find(
         raw.get("course"),
         options.standstill_m_s,
     )
+    check_fastest(evidence, units)
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
-    device = estimate(evidence.delayed(delay), options)
+    evidence = evidence.delayed(delay)
+    check_gravity(evidence, options)
+    device = estimate(evidence, options)
+    slopes = Slopes.of(evidence, device.mounting)
+    if options.slopes == "refuse":
+        check_slopes(slopes)
     gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
-    return Findings(timing, device, delay, gravity, tuple(changes))
+    return Findings(timing, device, slopes, delay, gravity, tuple(changes))
 
 
 def _trace(
@@ -185,13 +215,21 @@ def _cut(log: RawLog, options: ImportOptions) -> RawLog:
         raise DataError(f"start_s={options.start_s:g}: no rows are left; the log has {len(log.time)}")
     signals = {name: values[keep] for name, values in log.signals.items()}
     if "course" in signals:
-        signals["course"] = _unwrapped(signals["course"])
+        signals["course"] = _unwrapped(signals["course"], log.rows[keep])
     return replace(log, time=log.time[keep], signals=signals, rows=log.rows[keep])
 
 
-def _unwrapped(course: Floats) -> Floats:
+def _unwrapped(course: Floats, rows: NDArray[np.intp]) -> Floats:
     """Course (n,) without jumps of a full turn; NaN stays NaN."""
-    known = np.isfinite(course)
+    known = np.flatnonzero(np.isfinite(course))
+    steps = np.abs(np.diff(course[known]))
+    # The step across north is less than a full turn.
+    if np.any(steps > 1.1 * math.tau):
+        at = int(np.argmax(steps > 1.1 * math.tau))
+        raise DataError(
+            f"course jumps by {steps[at]:.4g} rad at data row {rows[known[at + 1]]}: its unit is not rad; "
+            "declare course=COLUMN:deg, or mend the log"
+        )
     result = course.copy()
     result[known] = np.unwrap(course[known])
     return result

@@ -238,7 +238,7 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     Raises:
         DataError: the yaw of the mounting is not given and the record does not show it.
     """
-    rest, rest_from = _rest(evidence)
+    rest, rest_from = rest_force(evidence)
     roll, pitch = (
         found if given is None else math.radians(given)
         for given, found in zip((options.roll_deg, options.pitch_deg), level(rest), strict=True)
@@ -267,18 +267,25 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     )
 
 
-def _rest(evidence: Evidence) -> tuple[Floats, Origin]:
+def rest_force(evidence: Evidence) -> tuple[Floats, Origin]:
     """Specific force without the car's own acceleration: at rest, or as the constant of a regression."""
     if evidence.still.sum() * evidence.dt >= _STILL_S:
         return evidence.force[evidence.still].mean(axis=0), "standstill"
     mean = evidence.force.mean(axis=0)
-    turning = _turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
+    if weightless(evidence.force):
+        return mean, "average"
+    turning = turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
     # A car that leans by an angle in proportion to v r has a vertical force that varies with its square.
     regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning, turning**2])
     return np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0], "average"
 
 
-def _turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
+def weightless(force: Floats) -> bool:
+    """Whether a force (n, 3) lacks gravity, in any unit: its mean is then small beside its size."""
+    return bool(np.linalg.norm(force.mean(axis=0)) < 0.7 * np.linalg.norm(force, axis=1).mean())
+
+
+def turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
     """The product v r (n,), without the bias of r as far as the record shows it."""
     if evidence.speed is None:
         return np.zeros(len(yaw_rate))
@@ -296,7 +303,7 @@ def _yaw_bias(evidence: Evidence, yaw_rate: Floats) -> float:
         return 0.0
     heading = np.cumsum(yaw_rate) * evidence.dt
     time = evidence.dt * np.arange(len(heading))
-    alike = correlation(_detrended(heading), _detrended(evidence.course))
+    alike = correlation(detrended(heading), detrended(evidence.course))
     # A course that is close to a straight line does not show the sense; the smaller bias is likelier.
     senses = (1.0, -1.0) if abs(alike) < CLEAR else (float(np.sign(alike)),)
     biases = [float(np.polyfit(time, heading - sense * evidence.course, 1)[0]) for sense in senses]
@@ -308,12 +315,13 @@ def _rate_sign(evidence: Evidence, leveled: Mounting, choice: Sign) -> tuple[int
     if evidence.course is None:
         return _chosen(choice, 1), None
     heading = np.cumsum(leveled.rate_in_car(evidence.rate)[:, 2]) * evidence.dt
-    found = correlation(_detrended(heading), _detrended(evidence.course))
+    found = correlation(detrended(heading), detrended(evidence.course))
     sign = _chosen(choice, -1 if found < -CLEAR else 1)
     return sign, sign * found
 
 
-def _detrended(values: Floats) -> Floats:
+def detrended(values: Floats) -> Floats:
+    """Values (n,) without their straight line."""
     # A straight line is what the bias of a rate leaves in its integral.
     time = np.linspace(-1.0, 1.0, len(values))
     slope, offset = np.polyfit(time, values, 1)
@@ -331,7 +339,7 @@ def _heading(
     force = leveled.force_in_car(evidence.force)[:, :2]
     x, y = (force - force.mean(axis=0)).T
     along = evidence.speed_rate - evidence.speed_rate.mean()
-    across = _turn(evidence, rate_sign * leveled.rate_in_car(evidence.rate)[:, 2])
+    across = turn(evidence, rate_sign * leveled.rate_in_car(evidence.rate)[:, 2])
     across = across - across.mean()
 
     def fit(sign: int) -> tuple[float, float]:
@@ -354,7 +362,7 @@ def _heading(
 def _agreement(evidence: Evidence, mounting: Mounting) -> tuple[float, float]:
     """Correlations of f_x with dv/dt, and of f_y with v r."""
     force = mounting.force_in_car(evidence.force)
-    turning = _turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
+    turning = turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
     return correlation(force[:, 0], evidence.speed_rate), correlation(force[:, 1], turning)
 
 
@@ -371,7 +379,7 @@ def _rate_bias(
     rate = mounting.rate_in_car(evidence.rate)
     if evidence.still.sum() * evidence.dt >= _STILL_S:
         return rate[evidence.still].mean(axis=0), ("standstill", "standstill")
-    turning = _turn(evidence, rate[:, 2])
+    turning = turn(evidence, rate[:, 2])
     leaning = turning * (rate[:, 2] - _yaw_bias(evidence, rate[:, 2]))
     # A car that leans in a turn has a pitch rate of r sin(roll), whose mean is no bias.
     regressors = np.column_stack([np.ones(len(rate)), leaning])

@@ -68,6 +68,12 @@ class ImportOptions:
     rate_sign: Sign = "estimate"
     """Whether the angular rates are reversed; estimated from the course, if there is one."""
 
+    slopes: Literal["refuse", "accept"] = "refuse"
+    """Refuse a log whose slopes (f_x on dv/dt, f_y on v r, heading on course) are far from 1, or accept."""
+
+    gravity: Literal["measured", "add"] = "measured"
+    """Whether the force contains gravity. If it is to be added, roll and pitch are those given, or zero."""
+
     gravity_m_s2: Positive | None = None
     """Gravity as the device measures it; estimated if not given. The difference to 9.81 is taken as a
     bias of the vertical axis."""
