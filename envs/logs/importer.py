@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
+from .channels import check_speed, check_standstill, drop_frozen, mend_spikes
 from .mounting import Estimate, Mounting, estimate, gather, shift, speed_delay
 from .plausibility import Slopes, check_fastest, check_gravity, check_slopes
 from .signals import (
@@ -125,6 +126,10 @@ def import_log(
     options = options or ImportOptions()
     log, changes = in_order(read_log(path, columns, units or {}), options)
     log = _cut(log, options)
+    for mend in (mend_spikes, drop_frozen):
+        log, mended = mend(log, options)
+        changes += mended
+    check_speed(log)
     series, timing = close_gaps(log, options)
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
     raw = {signal: on_grid(values, grid) for signal, values in series.items()}
@@ -171,6 +176,7 @@ def _find(
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
     evidence = evidence.delayed(delay)
     check_gravity(evidence, options)
+    check_standstill(evidence)
     device = estimate(evidence, options)
     slopes = Slopes.of(evidence, device.mounting)
     if options.slopes == "refuse":

@@ -39,10 +39,14 @@ class ImportOptions:
     """What comes later in the log is left out, s from its first stamp."""
 
     gaps: Literal["refuse", "bridge"] = "refuse"
-    """Refuse missing data (long steps, repeated stamps, empty cells), or bridge it by interpolation."""
+    """Refuse missing data (long steps, repeated stamps, empty cells, frozen sensors), or bridge it by
+    interpolation."""
 
     clock: Literal["refuse", "mend"] = "refuse"
     """Refuse a clock that wraps (a day, 32 bits of us), or mend it: unwrap its stamps."""
+
+    spikes: Literal["refuse", "median"] = "refuse"
+    """Refuse outliers of up to three samples, or replace them by the median of their neighbors."""
 
     longest_step_s: Positive = 0.2
     """A longer step between samples is a gap, s."""
@@ -112,6 +116,9 @@ UNITS: Final[Mapping[str, Mapping[str, float]]] = {
 }
 """Signals an import knows, each with its units and their SI values; the first unit is the default."""
 
+_NO_SPEED: Final = -1.0
+"""What receivers without a fix give for the speed, where it is the only negative value."""
+
 REQUIRED: Final = ("time", *FORCES, *RATES)
 """Signals an import cannot do without."""
 
@@ -178,6 +185,9 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
         column = columns[name]
         constant = _constant(column)
         values = table[_bare(column)] if constant is None else np.full(n, constant)
+        negative = values < 0.0
+        if name == "speed" and np.all(values[negative] == _NO_SPEED):
+            values = np.where(negative, np.nan, values)
         return values * (-factors[name] if constant is None and column.startswith("-") else factors[name])
 
     stamps = table[_bare(columns["time"])]
