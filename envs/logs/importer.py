@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
 from .channels import check_speed, check_standstill, drop_frozen, mend_spikes
-from .mounting import Estimate, Mounting, estimate, gather, shift, speed_delay
+from .mounting import LONGEST_DELAY_S, Estimate, Mounting, estimate, gather, shift, speed_delay
 from .plausibility import Slopes, check_fastest, check_gravity, check_slopes
 from .signals import (
     FORCES,
@@ -178,6 +178,12 @@ def _find(
     check_gravity(evidence, options)
     check_standstill(evidence)
     device = estimate(evidence, options)
+    if options.speed_delay_s is None and delay >= LONGEST_DELAY_S - 1e-6:
+        note = (
+            f"the delay of the speed is at the end of its range of {LONGEST_DELAY_S:g} s: check speed and "
+            "course, or give speed_delay_s"
+        )
+        device = replace(device, notes=(*device.notes, note))
     slopes = Slopes.of(evidence, device.mounting)
     if options.slopes == "refuse":
         check_slopes(slopes)

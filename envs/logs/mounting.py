@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ..cues import Floats
 from ..errors import DataError
-from .signals import ImportOptions, Sign, low_pass
+from .signals import FORCES, ImportOptions, Sign, low_pass
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,9 @@ _LEAST_SPEED_RATE: Final = 0.25
 
 _LEAST_COURSE_RATE: Final = 0.02
 """The same of the rate of the course, rad/s."""
+
+_CONSTANT: Final = 1e-6
+"""A force that varies by less is a constant, m/s^2."""
 
 _WEAK_FIT: Final = 0.1
 """Share of the variance of dv/dt that the force must explain before a delay is believed."""
@@ -244,6 +247,7 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
         for given, found in zip((options.roll_deg, options.pitch_deg), level(rest), strict=True)
     )
     leveled = Mounting(roll, pitch)
+    _check_constants(evidence, rest, options)
     rate_sign, rate_course = _rate_sign(evidence, leveled, options.rate_sign)
     yaw, lateral_sign = _heading(evidence, leveled, rate_sign, options)
     mounting = Mounting(roll, pitch, yaw, lateral_sign, rate_sign)
@@ -265,6 +269,20 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
         rate_course=rate_course,
         notes=_notes(mounting, rate_course, (force_speed, force_turn), evidence, options),
     )
+
+
+def _check_constants(evidence: Evidence, rest: Floats, options: ImportOptions) -> None:
+    """Refuse to estimate the yaw of the mounting from a horizontal force that is missing."""
+    if options.yaw_deg is not None:
+        return
+    turning = turn(evidence, evidence.rate @ (-rest / np.linalg.norm(rest)))
+    excited = min(evidence.speed_rate.std(), turning.std()) >= _LEAST_SPEED_RATE
+    for name, values, part in zip(FORCES, evidence.force.T, rest / np.linalg.norm(rest), strict=True):
+        if excited and np.ptp(values) < _CONSTANT and abs(part) < math.sqrt(0.5):
+            raise DataError(
+                f"{name} is constant in a drive that speeds up and turns: it does not show how the device is "
+                "turned in the car; name its column, or give yaw_deg"
+            )
 
 
 def rest_force(evidence: Evidence) -> tuple[Floats, Origin]:

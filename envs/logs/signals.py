@@ -108,7 +108,7 @@ _FORCE_UNITS: Final = {"m/s2": 1.0, "g": 9.80665}
 _RATE_UNITS: Final = {"rad/s": 1.0, "deg/s": math.radians(1.0)}
 
 UNITS: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     **dict.fromkeys(FORCES, _FORCE_UNITS),
     **dict.fromkeys(RATES, _RATE_UNITS),
     "speed": {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704},
@@ -118,6 +118,15 @@ UNITS: Final[Mapping[str, Mapping[str, float]]] = {
 
 _NO_SPEED: Final = -1.0
 """What receivers without a fix give for the speed, where it is the only negative value."""
+
+RECEIVED: Final = ("speed", "course")
+"""Signals of a receiver, which may have a lower rate than the rows of the log."""
+
+_SPARSE: Final = 0.6
+"""A signal with a smaller share of filled cells has a rate of its own."""
+
+_SPARSE_STEPS: Final = 2.5
+"""Such a signal has a gap where a step exceeds so many of its median steps."""
 
 REQUIRED: Final = ("time", *FORCES, *RATES)
 """Signals an import cannot do without."""
@@ -286,7 +295,10 @@ def close_gaps(log: RawLog, options: ImportOptions) -> tuple[dict[str, Series], 
         for name, values in log.signals.items()
     }
     likely = _likely_unit(time, log.time_unit)
-    bridged = sum(_bridge(name, stamps, options, likely) for name, (stamps, _) in series.items())
+    sparse = [name for name, values in log.signals.items() if _sparse(name, np.isfinite(values[keep]))]
+    bridged = sum(
+        _bridge(name, stamps, options, likely, name in sparse) for name, (stamps, _) in series.items()
+    )
     steps = np.diff(time)
     cells = sum(int(np.isnan(values[keep]).sum()) for values in log.signals.values())
     return series, Timing(
@@ -321,10 +333,16 @@ def _without_holes(name: str, series: Series, rows: NDArray[np.intp], options: I
     if np.any(np.isinf(values)):
         raise DataError(f"{name} is infinite at data row {rows[np.isinf(values)][0]}; mend the log")
     known = np.isfinite(values)
-    _refuse(options, rows[~known], f"{name} has an empty or NaN cell")
+    if not _sparse(name, known):
+        _refuse(options, rows[~known], f"{name} has an empty or NaN cell")
     if known.sum() < 2:
         raise DataError(f"{name} has fewer than 2 values; name another column")
     return time[known], values[known]
+
+
+def _sparse(name: str, known: NDArray[np.bool_]) -> bool:
+    """Whether a signal comes at a rate of its own, as a receiver's does, and leaves other cells empty."""
+    return name in RECEIVED and bool(known.mean() < _SPARSE)
 
 
 def _likely_unit(time: Floats, unit: str) -> str:
@@ -340,14 +358,15 @@ def _likely_unit(time: Floats, unit: str) -> str:
     return f"{said} It looks like {likely[0]} (time=COLUMN:{likely[0]})" if likely else said
 
 
-def _bridge(name: str, time: Floats, options: ImportOptions, likely: str) -> int:
+def _bridge(name: str, time: Floats, options: ImportOptions, likely: str, sparse: bool) -> int:
     steps = np.diff(time)
-    long = steps > options.longest_step_s
+    longest = max(options.longest_step_s, _SPARSE_STEPS * float(np.median(steps)) if sparse else 0.0)
+    long = steps > longest
     if options.gaps == "refuse" and np.any(long):
         at = int(np.argmax(long))
         raise DataError(
             f"gap of {steps[at]:.3g} s in {name} at {time[at]:.3f} s "
-            f"(longest_step_s={options.longest_step_s:g})"
+            + (f"(its usual step is {np.median(steps):.3g} s)" if sparse else f"(longest_step_s={longest:g})")
             + (likely or "; set gaps='bridge', or leave it out with start_s or end_s")
         )
     if steps.max() > options.longest_gap_s:

@@ -26,6 +26,10 @@ WRAPS: Final = {
 }
 """Periods after which clocks begin again, s."""
 
+_BURST_STEP: Final = 0.3
+_BURST_SHARE: Final = 0.3
+"""Stamps come in bursts if this share of the steps is shorter than that share of the mean step."""
+
 _SEAM_STEPS: Final = 5.0
 """A step across a seam of at most so many median steps goes on where the clock ended."""
 
@@ -40,7 +44,7 @@ def in_order(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]:
     stamps = log.time[known]
     back = np.flatnonzero(np.diff(stamps) < 0.0) + 1
     if not len(back):
-        return log, []
+        return _even(log, known, options)
     row = log.rows[known[back[0]]]
     told = f"time runs backwards at data row {row}, by {stamps[back[0] - 1] - stamps[back[0]]:.6g} s"
     forward = np.diff(stamps)[np.diff(stamps) > 0.0]
@@ -57,7 +61,33 @@ def in_order(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]:
     time[known] = stamps + period * _turns(len(stamps), back)
     rows = ", ".join(str(log.rows[known[place]]) for place in back[:5])
     change = f"clock unwrapped: it began again after {name} at data row {rows} ({len(back)} in all)"
-    return replace(log, time=time), [change]
+    log, changes = _even(replace(log, time=time), known, options)
+    return log, [change, *changes]
+
+
+def _even(log: RawLog, known: NDArray[np.intp], options: ImportOptions) -> tuple[RawLog, list[str]]:
+    """The log with rows evenly spaced, if they were handed over in bursts, and what was changed."""
+    stamps = log.time[known]
+    steps = np.diff(stamps)
+    usual = steps[(steps > 0.0) & (steps <= options.longest_step_s)]
+    if not len(usual) or np.mean(usual < _BURST_STEP * usual.mean()) < _BURST_SHARE:
+        return log, []
+    told = (
+        f"the time stamps come in bursts: their steps are {np.median(usual):.3g} s at the median, "
+        f"{usual.mean():.3g} s in the mean"
+    )
+    if options.clock == "refuse":
+        raise DataError(
+            f"{told}; set clock='mend' to space the rows evenly, or write the sensor's own stamps"
+        )
+    parts = np.split(np.arange(len(stamps)), np.flatnonzero(steps > options.longest_step_s) + 1)
+    time = log.time.copy()
+    for part in (part for part in parts if len(part) > 1):
+        time[known[part]] = np.polyval(np.polyfit(part, stamps[part], 1), part)
+    if np.any(np.diff(time[known]) <= 0.0):
+        raise DataError(f"{told}, and rows are missing between them; write the sensor's own stamps")
+    time -= time[known[0]]
+    return replace(log, time=time), ["rows evenly spaced: the time stamps came in bursts"]
 
 
 def _turns(samples: int, back: NDArray[np.intp]) -> Floats:

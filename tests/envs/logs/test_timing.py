@@ -70,3 +70,32 @@ def test_a_clock_that_begins_again_is_no_wrap(tmp_path: Path, offset: float) -> 
     columns["t"] = offset + np.where(columns["t"] < 40.0, columns["t"] + 7.0, columns["t"] - 40.0)
     with pytest.raises(DataError, match=r"time runs backwards at data row 2001, .*; sort or split the log"):
         imported(tmp_path, columns, "s", clock="mend")
+
+
+@pytest.mark.parametrize("size", [2, 5, 10])
+def test_stamps_in_bursts_are_spread_by_choice(tmp_path: Path, size: int) -> None:
+    columns = table()
+    rows = np.arange(len(columns["t"]))
+    columns["t"] = 0.02 * size * (rows // size) + 2e-5 * (rows % size)
+    with pytest.raises(DataError, match=r"come in bursts: .*clock='mend'"):
+        imported(tmp_path, columns, "s")
+    mended = imported(tmp_path, columns, "s", clock="mend")
+    assert mended.findings.timing.rate_hz == pytest.approx(50.0, rel=0.01)
+    plain = imported(tmp_path, table(), "s").trace.specific_force
+    n = min(len(plain), len(mended.trace))
+    # The burst is handed over up to its own length late.
+    assert np.abs(mended.trace.specific_force[:n] - plain[:n]).max() < 0.02 * size * 3.0
+
+
+def test_stamps_that_jitter_are_no_bursts(tmp_path: Path) -> None:
+    columns = table()
+    columns["t"] = columns["t"] + np.random.default_rng(1).uniform(-0.008, 0.008, len(columns["t"]))
+    assert imported(tmp_path, columns, "s").findings.changes == ()
+
+
+def test_nanoseconds_are_known_and_recognized(tmp_path: Path) -> None:
+    columns = table()
+    columns["t"] = 1e18 + 1e9 * columns["t"]
+    assert imported(tmp_path, columns, "ns").trace.duration == pytest.approx(60.0, abs=0.011)
+    with pytest.raises(DataError, match="looks like ns"):
+        imported(tmp_path, columns, "us")
