@@ -12,7 +12,7 @@ from scipy.ndimage import label, median_filter
 from ..cues import Floats
 from ..errors import DataError
 from .mounting import Evidence
-from .signals import FORCES, RATES, UNITS, ImportOptions, RawLog
+from .signals import FORCES, RATES, UNITS, Change, ImportOptions, RawLog
 
 _LEAST_SPIKE: Final = {**dict.fromkeys(FORCES, 8.0), **dict.fromkeys(RATES, 1.0), "speed": 5.0}
 """A smaller deviation from the running median is no outlier, m/s^2, rad/s, m/s."""
@@ -39,7 +39,7 @@ _LARGEST_SPEED_STEP: Final = 10.0
 """A speed that changes by more between two samples, to or from zero, is a channel that died or woke, m/s."""
 
 
-def mend_spikes(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]:
+def mend_spikes(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]:
     """The log without outliers of up to three samples, and what was changed.
 
     An outlier is far from the running median, in comparison with the deviations of its whole channel.
@@ -47,7 +47,7 @@ def mend_spikes(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]
     Raises:
         DataError: there is an outlier, and the options refuse it.
     """
-    signals, changes = dict(log.signals), []
+    signals, changes = dict(log.signals), list[Change]()
     for name, least in _LEAST_SPIKE.items():
         if name not in signals:
             continue
@@ -72,7 +72,8 @@ def mend_spikes(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]
             )
         signals[name] = signals[name].copy()
         signals[name][known[outliers]] = median[outliers]
-        changes.append(f"{told}: replaced by the median of its neighbors ({len(outliers)} in all)")
+        text = f"{told}: replaced by the median of its neighbors ({len(outliers)} in all)"
+        changes.append(Change(text, tuple(log.time[known[outliers]].tolist())))
     return replace(log, signals=signals), changes
 
 
@@ -84,7 +85,7 @@ def _running_median(values: Floats, time: Floats) -> Floats:
     return np.asarray(median_filter(values, size=size, mode="mirror"))
 
 
-def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]:
+def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]:
     """The log with empty cells where a sensor held one value, and what was changed.
 
     Raises:
@@ -96,7 +97,7 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]
             if _standing(log, hold, options):
                 continue
             frozen.setdefault(hold, []).append(name)
-    signals, changes = dict(log.signals), []
+    signals, changes = dict(log.signals), list[Change]()
     for (first, last), names in sorted(frozen.items()):
         told = (
             f"{', '.join(names)} held one value from {log.time[first]:.3f} to {log.time[last]:.3f} s "
@@ -109,7 +110,7 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]
         for name in names:
             signals[name] = signals[name].copy()
             signals[name][first + 1 : last + 1] = np.nan
-        changes.append(f"{told}: taken as a gap")
+        changes.append(Change(f"{told}: taken as a gap", (float(log.time[first]), float(log.time[last]))))
     return replace(log, signals=signals), changes
 
 
@@ -142,7 +143,7 @@ def _frozen(time: Floats, values: Floats) -> list[tuple[int, int]]:
         return bool(steps[sample] >= scale)
 
     found = []
-    for first, last in zip(starts, ends, strict=True):
+    for first, last in zip(starts.tolist(), ends.tolist(), strict=True):
         long = last - first + 1 >= max(_LEAST_HOLD[1], usual) and time[last] - time[first] >= _LEAST_HOLD[0]
         edges = [edge for edge in (first - 1, last) if 0 <= edge < n - 1]
         if not long or not edges:
@@ -152,7 +153,7 @@ def _frozen(time: Floats, values: Floats) -> list[tuple[int, int]]:
         else:
             abrupt = first > 0 and all(jumps(edge, 0.5 * typical) for edge in edges)
         if (fine and abrupt) or jumps(edges[-1], large):
-            found.append((int(first), int(last)))
+            found.append((first, last))
     return found
 
 

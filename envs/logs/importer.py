@@ -19,6 +19,7 @@ from .plausibility import Slopes, check_fastest, check_gravity, check_slopes
 from .signals import (
     FORCES,
     RATES,
+    Change,
     Grid,
     ImportOptions,
     RawLog,
@@ -45,7 +46,7 @@ class Findings:
         slopes: How steeply force and heading follow speed and course.
         speed_delay: How long the speed lags behind the force, s.
         gravity: Gravity as the device measures it, m/s^2.
-        changes: What was mended in the log, by choice.
+        changes: What was mended in the log, by choice, with places in the trace's time.
     """
 
     timing: Timing
@@ -53,7 +54,7 @@ class Findings:
     slopes: Slopes
     speed_delay: float
     gravity: float
-    changes: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
 
     def lines(self) -> list[str]:
         """A report for people, angles in degrees."""
@@ -74,7 +75,7 @@ class Findings:
             f"f_y with v r       correlation {d.force_turn:.3f}",
             f"heading, course    correlation {course}",
             *self.slopes.lines(),
-            *(f"changed            {change}" for change in self.changes),
+            *(f"changed            {change.text}" for change in self.changes),
             *(f"note               {note}" for note in d.notes),
         ]
 
@@ -147,12 +148,12 @@ def import_log(
 
 def _with_gravity(
     raw: Mapping[str, Floats], options: ImportOptions
-) -> tuple[dict[str, Floats], ImportOptions, str]:
+) -> tuple[dict[str, Floats], ImportOptions, Change]:
     """Signals with the force of gravity at the attitude given, or at none, which then holds."""
     roll, pitch = options.roll_deg or 0.0, options.pitch_deg or 0.0
     rest = Mounting(math.radians(roll), math.radians(pitch)).matrix.T @ [0.0, 0.0, -GRAVITY]
     added = {name: raw[name] + rest[axis] for axis, name in enumerate(FORCES)}
-    change = f"gravity added, for a device at roll {roll:g}, pitch {pitch:g} deg"
+    change = Change(f"gravity added, for a device at roll {roll:g}, pitch {pitch:g} deg")
     return {**raw, **added}, replace(options, roll_deg=roll, pitch_deg=pitch), change
 
 
@@ -160,7 +161,7 @@ def _find(
     raw: Mapping[str, Floats],
     grid: Grid,
     timing: Timing,
-    changes: list[str],
+    changes: list[Change],
     units: Mapping[str, str],
     options: ImportOptions,
 ) -> Findings:
@@ -188,7 +189,9 @@ def _find(
     if options.slopes == "refuse":
         check_slopes(slopes)
     gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
-    return Findings(timing, device, slopes, delay, gravity, tuple(changes))
+    return Findings(
+        timing, device, slopes, delay, gravity, tuple(change.later(grid.start) for change in changes)
+    )
 
 
 def _trace(

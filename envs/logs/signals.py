@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -149,6 +149,23 @@ class RawLog:
     rows: NDArray[np.intp]
     time_unit: str = "s"
     first_stamp_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """What was mended in a log, by choice.
+
+    Attributes:
+        text: For people, with rows and times of the log.
+        places: Times at which values were changed, s; empty where all were.
+    """
+
+    text: str
+    places: tuple[float, ...] = ()
+
+    def later(self, start: float) -> Change:
+        """The change in a time that begins at ``start`` of this one."""
+        return replace(self, places=tuple(place - start for place in self.places))
 
 
 def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..cues import Floats
 from ..errors import DataError
-from .signals import ImportOptions, RawLog
+from .signals import Change, ImportOptions, RawLog
 
 WRAPS: Final = {
     "a day": 86400.0,
@@ -34,7 +34,7 @@ _SEAM_STEPS: Final = 5.0
 """A step across a seam of at most so many median steps goes on where the clock ended."""
 
 
-def in_order(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]:
+def in_order(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]:
     """The log with a clock that never runs backwards, and what was changed.
 
     Raises:
@@ -60,12 +60,13 @@ def in_order(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[str]]:
     time = log.time.copy()
     time[known] = stamps + period * _turns(len(stamps), back)
     rows = ", ".join(str(log.rows[known[place]]) for place in back[:5])
-    change = f"clock unwrapped: it began again after {name} at data row {rows} ({len(back)} in all)"
+    text = f"clock unwrapped: it began again after {name} at data row {rows} ({len(back)} in all)"
+    change = Change(text, tuple(time[known[back]].tolist()))
     log, changes = _even(replace(log, time=time), known, options)
     return log, [change, *changes]
 
 
-def _even(log: RawLog, known: NDArray[np.intp], options: ImportOptions) -> tuple[RawLog, list[str]]:
+def _even(log: RawLog, known: NDArray[np.intp], options: ImportOptions) -> tuple[RawLog, list[Change]]:
     """The log with rows evenly spaced, if they were handed over in bursts, and what was changed."""
     stamps = log.time[known]
     steps = np.diff(stamps)
@@ -87,7 +88,7 @@ def _even(log: RawLog, known: NDArray[np.intp], options: ImportOptions) -> tuple
     if np.any(np.diff(time[known]) <= 0.0):
         raise DataError(f"{told}, and rows are missing between them; write the sensor's own stamps")
     time -= time[known[0]]
-    return replace(log, time=time), ["rows evenly spaced: the time stamps came in bursts"]
+    return replace(log, time=time), [Change("rows evenly spaced: the time stamps came in bursts")]
 
 
 def _turns(samples: int, back: NDArray[np.intp]) -> Floats:

@@ -60,7 +60,7 @@ def test_outliers(tmp_path: Path, kind: str, noise: str) -> None:
     with pytest.raises(DataError, match=message):
         imported(tmp_path, bad)
     mended = imported(tmp_path, bad, spikes="median")
-    assert f"data row {rows[0] + 1} " in mended.findings.changes[0]
+    assert f"data row {rows[0] + 1} " in mended.findings.changes[0].text
     assert_alike(mended, imported(tmp_path, good), 0.4 if NOISE[noise] else 0.05)
 
 
@@ -82,7 +82,7 @@ def test_a_frozen_sensor_is_a_gap(tmp_path: Path, noise: str, start: int, length
     with pytest.raises(DataError, match=message):
         imported(tmp_path, bad)
     result = imported(tmp_path, bad, gaps="bridge")
-    assert "taken as a gap" in result.findings.changes[0]
+    assert "taken as a gap" in result.findings.changes[0].text
     with pytest.raises(DataError, match="too long to bridge"):
         imported(tmp_path, bad, gaps="bridge", longest_gap_s=0.02 * length - 0.1)
 

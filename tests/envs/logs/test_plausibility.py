@@ -105,7 +105,7 @@ def test_missing_gravity_is_named_and_added_by_choice(tmp_path: Path, yaw: float
     mended = imported(tmp_path, without, gravity="add", **attitude)
     whole = imported(tmp_path, table, **attitude)
     np.testing.assert_allclose(mended.trace.specific_force, whole.trace.specific_force, atol=1e-6)
-    assert "gravity added" in mended.findings.changes[0]
+    assert "gravity added" in mended.findings.changes[0].text
     with pytest.raises(DataError, match="comes with gravity; leave out gravity='add'"):
         imported(tmp_path, table, gravity="add")
 

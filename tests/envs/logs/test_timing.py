@@ -49,7 +49,7 @@ def test_a_clock_that_wraps_is_named_and_unwrapped_by_choice(tmp_path: Path, kin
         imported(tmp_path, columns, unit, start_s=1.0)
     mended = imported(tmp_path, columns, unit, clock="mend")
     assert mended.trace.duration == pytest.approx(60.0, abs=0.011)
-    assert f"data row {first}" in mended.findings.changes[0]
+    assert f"data row {first}" in mended.findings.changes[0].text
     plain = imported(tmp_path, table(), "s")
     n = min(len(plain.trace), len(mended.trace))
     np.testing.assert_allclose(mended.trace.specific_force[:n], plain.trace.specific_force[:n], atol=1e-3)
