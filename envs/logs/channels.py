@@ -92,7 +92,7 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
         DataError: a sensor froze, and the options refuse gaps.
     """
     frozen: dict[tuple[int, int], list[str]] = {}
-    for name in (*FORCES, *RATES):
+    for name in (name for name in (*FORCES, *RATES) if name in log.signals):
         for hold in _frozen(log.time, log.signals[name]):
             if _standing(log, hold, options):
                 continue

@@ -14,11 +14,24 @@ from numpy.typing import NDArray
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
 from .channels import check_speed, check_standstill, drop_frozen, mend_spikes
-from .mounting import LONGEST_DELAY_S, Estimate, Mounting, estimate, gather, shift, speed_delay
+from .mounting import (
+    CLEAR,
+    LONGEST_DELAY_S,
+    Estimate,
+    Mounting,
+    correlation,
+    detrended,
+    estimate,
+    gather,
+    shift,
+    speed_delay,
+    yaw_bias,
+)
 from .plausibility import Slopes, check_fastest, check_gravity, check_slopes
 from .signals import (
     FORCES,
     RATES,
+    REQUIRED,
     Change,
     Grid,
     ImportOptions,
@@ -125,7 +138,9 @@ def import_log(
         DataError: the log is broken, or does not show what has to be estimated.
     """
     options = options or ImportOptions()
-    log, changes = in_order(read_log(path, columns, units or {}), options)
+    computed = options.force == "from-speed"
+    required = ("time", "speed", *RATES) if computed else REQUIRED
+    log, changes = in_order(read_log(path, columns, units or {}, required), options)
     log = _cut(log, options)
     for mend in (mend_spikes, drop_frozen):
         log, mended = mend(log, options)
@@ -134,7 +149,10 @@ def import_log(
     series, timing = close_gaps(log, options)
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
     raw = {signal: on_grid(values, grid) for signal, values in series.items()}
-    if options.gravity == "add":
+    if computed:
+        raw, options, change = _with_force(raw, grid, options)
+        changes.append(change)
+    elif options.gravity == "add":
         raw, options, change = _with_gravity(raw, options)
         changes.append(change)
     findings = _find(raw, grid, timing, changes, units or {}, options)
@@ -143,6 +161,42 @@ def import_log(
         findings=findings,
         raw_force=_stacked(raw, FORCES)[:: grid.every],
         raw_rate=_stacked(raw, RATES)[:: grid.every],
+    )
+
+
+def _with_force(
+    raw: Mapping[str, Floats], grid: Grid, options: ImportOptions
+) -> tuple[dict[str, Floats], ImportOptions, Change]:
+    """Signals with f = dv/dt + omega x v - g of a car that moves along its x axis, and its options."""
+    rate = _stacked(raw, RATES)
+    course = raw.get("course")
+    evidence = gather(grid.rate_hz, np.zeros_like(rate), rate, raw["speed"], course, options.standstill_m_s)
+    sign = {"keep": 1, "flip": -1}.get(options.rate_sign, 1)
+    if options.rate_sign == "estimate" and evidence.course is not None:
+        heading = detrended(np.cumsum(evidence.rate[:, 2]) * evidence.dt)
+        sign = -1 if correlation(heading, detrended(evidence.course)) < -CLEAR else 1
+    speed = low_pass(raw["speed"], grid.rate_hz, min(SPEED_CUTOFF_HZ, options.cutoff_hz))
+    yaw_rate = sign * (rate[:, 2] - yaw_bias(evidence, evidence.rate[:, 2]))
+    pitch_rate = sign * (rate[:, 1] - rate[:, 1].mean())
+    force = {
+        "force_x": np.gradient(speed, 1.0 / grid.rate_hz),
+        "force_y": speed * yaw_rate,
+        "force_z": -speed * pitch_rate - GRAVITY,
+    }
+    aligned = replace(
+        options,
+        roll_deg=0.0,
+        pitch_deg=0.0,
+        yaw_deg=0.0,
+        lateral_sign="keep",
+        rate_sign="flip" if sign < 0 else "keep",
+        gravity_m_s2=GRAVITY,
+        speed_delay_s=options.speed_delay_s or 0.0,
+    )
+    return (
+        {**raw, **force},
+        aligned,
+        Change("force not measured: computed as dv/dt + omega x v, with gravity"),
     )
 
 

@@ -307,10 +307,10 @@ def turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
     """The product v r (n,), without the bias of r as far as the record shows it."""
     if evidence.speed is None:
         return np.zeros(len(yaw_rate))
-    return np.asarray(evidence.speed * (yaw_rate - _yaw_bias(evidence, yaw_rate)))
+    return np.asarray(evidence.speed * (yaw_rate - yaw_bias(evidence, yaw_rate)))
 
 
-def _yaw_bias(evidence: Evidence, yaw_rate: Floats) -> float:
+def yaw_bias(evidence: Evidence, yaw_rate: Floats) -> float:
     """Bias of a yaw rate (n,) of unknown sense: at standstill, or as its drift against the course.
 
     The mean is no bias: a drive may turn more one way than the other.
@@ -398,7 +398,7 @@ def _rate_bias(
     if evidence.still.sum() * evidence.dt >= _STILL_S:
         return rate[evidence.still].mean(axis=0), ("standstill", "standstill")
     turning = turn(evidence, rate[:, 2])
-    leaning = turning * (rate[:, 2] - _yaw_bias(evidence, rate[:, 2]))
+    leaning = turning * (rate[:, 2] - yaw_bias(evidence, rate[:, 2]))
     # A car that leans in a turn has a pitch rate of r sin(roll), whose mean is no bias.
     regressors = np.column_stack([np.ones(len(rate)), leaning])
     pitch_bias = np.linalg.lstsq(regressors, rate[:, 1], rcond=None)[0][0]

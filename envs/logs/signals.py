@@ -75,6 +75,10 @@ class ImportOptions:
     slopes: Literal["refuse", "accept"] = "refuse"
     """Refuse a log whose slopes (f_x on dv/dt, f_y on v r, heading on course) are far from 1, or accept."""
 
+    force: Literal["measured", "from-speed"] = "measured"
+    """Whether the log has a force. From speed, it is dv/dt + omega x v with gravity, for rates about
+    the car's own axes on a level road."""
+
     gravity: Literal["measured", "add"] = "measured"
     """Whether the force contains gravity. If it is to be added, roll and pitch are those given, or zero."""
 
@@ -190,7 +194,12 @@ def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]
     return columns, units
 
 
-def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, str]) -> RawLog:
+def read_log(
+    path: str | Path,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    required: tuple[str, ...] = REQUIRED,
+) -> RawLog:
     """Read the named columns of a CSV file and convert them to SI units.
 
     Args:
@@ -198,12 +207,13 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
         columns: Column of each signal. A leading ``-`` reverses it; a number instead of a
             column stands for a constant, in the same unit.
         units: Unit of each signal; SI where none is given.
+        required: Signals that need a column.
 
     Raises:
         ConfigurationError: a signal or unit is unknown, or a required signal has no column.
         DataError: the file cannot be read, or a column is missing or holds text.
     """
-    factors = _factors(columns, units)
+    factors = _factors(columns, units, required)
     table = read_table(path, sorted({_bare(c) for c in columns.values() if _constant(c) is None}))
     n = len(next(iter(table.values())))
 
@@ -226,10 +236,12 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
     return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"), first * factors["time"])
 
 
-def _factors(columns: Mapping[str, str], units: Mapping[str, str]) -> dict[str, float]:
+def _factors(
+    columns: Mapping[str, str], units: Mapping[str, str], required: tuple[str, ...]
+) -> dict[str, float]:
     for name in (*columns, *units):
         _check_signal(name)
-    missing = [name for name in REQUIRED if name not in columns]
+    missing = [name for name in required if name not in columns]
     if missing:
         raise ConfigurationError(
             f"no column for {', '.join(missing)}; name one with signal=column, or give a constant"

@@ -385,3 +385,24 @@ def test_only_repeated_columns_that_are_used_matter(tmp_path: Path) -> None:
     path.write_text("\n".join(["Logger 7", header, *rows]))
     with pytest.raises(DataError, match="the first line, 'Logger 7', is no header of columns"):
         import_log(path, WITH_COURSE)
+
+
+@pytest.mark.parametrize("rate_sign", [1, -1])
+def test_a_log_without_forces_takes_them_from_the_speed_by_choice(tmp_path: Path, rate_sign: int) -> None:
+    truth = drive()
+    device = Device(rate_sign=rate_sign, rate_bias=(0.0, 0.0, 0.02))
+    columns = {name: column for name, column in WITH_COURSE.items() if not name.startswith("force")}
+    path = write(tmp_path / "log.csv", device.records(truth))
+    with pytest.raises(ConfigurationError, match="no column for force_x"):
+        import_log(path, columns)
+    result = import_log(path, columns, options=ImportOptions(force="from-speed"))
+    assert "force not measured" in result.findings.changes[0].text
+    wanted = at_100_hz(truth, truth.force)[INSIDE]
+    wanted[:, 2] -= at_100_hz(truth, truth.speed[:, None] * truth.rate)[INSIDE, 1]
+    np.testing.assert_allclose(result.trace.specific_force[INSIDE], wanted, atol=0.1)
+    np.testing.assert_allclose(
+        result.trace.angular_velocity[INSIDE], at_100_hz(truth, truth.rate)[INSIDE], atol=4e-3
+    )
+    no_speed = {name: column for name, column in columns.items() if name != "speed"}
+    with pytest.raises(ConfigurationError, match="no column for speed"):
+        import_log(path, no_speed, options=ImportOptions(force="from-speed"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -74,4 +75,15 @@ def test_random_drives(tmp_path: Path) -> None:
     for number, drive in enumerate(random_drives(6, 60.0, 7)):
         device = rotation(*np.random.default_rng(number).uniform(-1.5, 1.5, 3))
         result = import_log(exported(tmp_path, drive, device, -0.5, 0.3, 0.1), WITH_COURSE)
+        assert error(result, drive) < LARGEST_J
+
+
+def test_all_right_angled_mountings(tmp_path: Path) -> None:
+    """Every way to put a box into a car along its axes, also with one axis mirrored."""
+    drive = random_drives(1, 60.0, 3)[0]
+    corners = [np.eye(3)[list(order)] * signs
+               for order in itertools.permutations(range(3))
+               for signs in itertools.product([1.0, -1.0], repeat=3)]  # fmt: skip
+    for device in corners[::2] + corners[1::6]:
+        result = import_log(exported(tmp_path, drive, device, 0.5, 0.4, 0.05), WITH_COURSE)
         assert error(result, drive) < LARGEST_J
