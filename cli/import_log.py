@@ -38,8 +38,8 @@ class ImportCommand:
     file: Annotated[Path, option("LOG")] = field(kw_only=False)
     """Log to convert: CSV with a header row, or .csv.gz."""
     columns: Annotated[tuple[str, ...], several("SIGNAL=COLUMN[:UNIT] ...")]
-    """Columns of the signals time [s, ms, us, ns], force_x force_y force_z [m/s2, g], rate_x rate_y rate_z
-    [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
+    """Columns of the signals time [s, ms, us, ns, hhmmss], force_x force_y force_z [m/s2, g], rate_x rate_y
+    rate_z [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
     before a column reverses it; a number instead of one is a constant. Speed and course may be missing."""
     out: Annotated[Path, option("FILE")]
     """Cues to write, as CSV; packed if the name ends in .gz. Its .findings.txt is written beside it."""

@@ -167,8 +167,15 @@ def check_speed(log: RawLog) -> None:
         return
     known = np.flatnonzero(np.isfinite(log.signals["speed"]) & np.isfinite(log.time))
     speed = log.signals["speed"][known]
-    steps = np.abs(np.diff(speed))
-    dead = (steps > _LARGEST_SPEED_STEP) & (np.minimum(np.abs(speed[1:]), np.abs(speed[:-1])) < 0.3)
+    steps, apart = np.abs(np.diff(speed)), np.diff(log.time[known])
+    if not len(steps):
+        return
+    # Across a gap of the log, a speed may change.
+    dead = (
+        (apart <= 2.5 * np.median(apart))
+        & (steps > _LARGEST_SPEED_STEP)
+        & (np.minimum(np.abs(speed[1:]), np.abs(speed[:-1])) < 0.3)
+    )
     if np.any(dead):
         at = int(np.argmax(dead)) + 1
         row = log.rows[known[at]]

@@ -112,7 +112,7 @@ _FORCE_UNITS: Final = {"m/s2": 1.0, "g": 9.80665}
 _RATE_UNITS: Final = {"rad/s": 1.0, "deg/s": math.radians(1.0)}
 
 UNITS: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "hhmmss": 1.0},
     **dict.fromkeys(FORCES, _FORCE_UNITS),
     **dict.fromkeys(RATES, _RATE_UNITS),
     "speed": {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704},
@@ -229,11 +229,25 @@ def read_log(
     stamps = table[_bare(columns["time"])]
     if not np.any(np.isfinite(stamps)):
         raise DataError(f"{path}: column {columns['time']} holds no time stamp")
+    if units.get("time") == "hhmmss":
+        stamps = _seconds_of_day(stamps, str(path))
     # Subtracting before scaling keeps the digits of stamps counted from 1970.
     first = float(stamps[np.isfinite(stamps)][0])
     time = (stamps - first) * factors["time"]
     signals = {name: signal(name) for name in columns if name != "time"}
     return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"), first * factors["time"])
+
+
+def _seconds_of_day(stamps: Floats, path: str) -> Floats:
+    """Seconds since midnight of clock times such as 95850.04, 9:58:50.04."""
+    hours, minutes, seconds = stamps // 1e4, stamps // 100.0 % 100.0, stamps % 100.0
+    wrong = np.flatnonzero((hours >= 24.0) | (minutes >= 60.0) | (seconds >= 60.0) | (stamps < 0.0))
+    if len(wrong):
+        raise DataError(
+            f"{path}: the time {stamps[wrong[0]]:.10g} at data row {wrong[0] + 1} is no HHMMSS; declare "
+            "another unit, time=COLUMN:s"
+        )
+    return np.asarray(hours * 3600.0 + minutes * 60.0 + seconds)
 
 
 def _factors(
@@ -323,7 +337,7 @@ def close_gaps(log: RawLog, options: ImportOptions) -> tuple[dict[str, Series], 
         name: _without_holes(name, (time, values[keep]), rows, options)
         for name, values in log.signals.items()
     }
-    likely = _likely_unit(time, log.time_unit)
+    likely = _likely_unit(time, log.time_unit, log.first_stamp_s)
     sparse = [name for name, values in log.signals.items() if _sparse(name, np.isfinite(values[keep]))]
     bridged = sum(
         _bridge(name, stamps, options, likely, name in sparse) for name, (stamps, _) in series.items()
@@ -352,7 +366,7 @@ def _kept_rows(log: RawLog, options: ImportOptions) -> NDArray[np.intp]:
     _refuse(options, log.rows[known[1:][steps == 0.0]], "time stamp repeats")
     kept = np.concatenate([known[:1], known[1:][steps > 0.0]])
     if len(kept) < 2 or time[kept[-1]] - time[kept[0]] < _SHORTEST_S:
-        likely = _likely_unit(time[kept], log.time_unit) or "; name a longer one"
+        likely = _likely_unit(time[kept], log.time_unit, log.first_stamp_s) or "; name a longer one"
         raise DataError(f"the log is shorter than {_SHORTEST_S:g} s{likely}")
     return kept
 
@@ -374,17 +388,32 @@ def _sparse(name: str, known: NDArray[np.bool_]) -> bool:
     return name in RECEIVED and bool(known.mean() < _SPARSE)
 
 
-def _likely_unit(time: Floats, unit: str) -> str:
+def _likely_unit(time: Floats, unit: str, first: float) -> str:
     """The unit that the time stamps probably have, as the end of a message; nothing if theirs will do."""
     if len(time) < 2:
         return ""
     step, known = float(np.median(np.diff(time))), UNITS["time"]
+    if unit == "s" and _clock_time(time + first, step):
+        return ": the time looks like HHMMSS, which jumps at each minute; declare time=COLUMN:hhmmss"
     least, most = _USUAL_STEP_S
     if least <= step <= most:
         return ""
     likely = [one for one, factor in known.items() if least <= step / known[unit] * factor <= most]
     said = f"; the steps of the time are {step:.3g} s: is its unit {unit}?"
     return f"{said} It looks like {likely[0]} (time=COLUMN:{likely[0]})" if likely else said
+
+
+def _clock_time(stamps: Floats, step: float) -> bool:
+    """Whether each stamp (n,) reads as HHMMSS, and each minute and hour that ends makes the jump of that."""
+    steps = np.diff(stamps)
+    jumps = np.abs((steps + 0.5) % 100.0 - 40.5) <= 2.0 * step + 0.5
+    return bool(
+        step < 10.0
+        and np.all(stamps % 100.0 < 60.0)
+        and np.all(stamps // 100.0 % 100.0 < 60.0)
+        and np.all(jumps[steps > 10.0])
+        and np.any(jumps & (steps > 10.0))
+    )
 
 
 def _bridge(name: str, time: Floats, options: ImportOptions, likely: str, sparse: bool) -> int:

@@ -99,3 +99,28 @@ def test_nanoseconds_are_known_and_recognized(tmp_path: Path) -> None:
     assert imported(tmp_path, columns, "ns").trace.duration == pytest.approx(60.0, abs=0.011)
     with pytest.raises(DataError, match="looks like ns"):
         imported(tmp_path, columns, "us")
+
+
+@pytest.mark.parametrize(
+    "start", [9 * 3600 + 58 * 60 + 50, 9 * 3600 + 59 * 60 + 50, 86400 - 20, 12 * 3600 + 29]
+)
+def test_clock_times_are_recognized_and_read(tmp_path: Path, start: int) -> None:
+    columns = table()
+    seconds = (start + columns["t"]) % 86400.0
+    columns["t"] = np.round(seconds // 3600 * 1e4 + seconds // 60 % 60 * 100 + seconds % 60, 4)
+    midnight = start > 86000
+    with pytest.raises(
+        DataError, match="runs backwards" if midnight else "looks like HHMMSS.*time=COLUMN:hhmmss"
+    ):
+        imported(tmp_path, columns, "s")
+    result = imported(tmp_path, columns, "hhmmss", clock="mend")
+    assert result.trace.duration == pytest.approx(60.0, abs=0.011)
+    assert bool(result.findings.changes) == midnight
+
+
+def test_what_is_no_clock_time(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="the time 60 at data row 3001 is no HHMMSS"):
+        imported(tmp_path, table(), "hhmmss")
+    columns = {name: np.delete(column, slice(1000, 2990)) for name, column in table().items()}
+    with pytest.raises(DataError, match=r"gap of 39.8 s .*\(longest_step_s=0.2\); set gaps"):
+        imported(tmp_path, columns, "s")
