@@ -12,7 +12,7 @@ from scipy.ndimage import label, median_filter
 from ..cues import Floats
 from ..errors import DataError
 from .mounting import Evidence
-from .signals import FORCES, RATES, UNITS, Change, ImportOptions, RawLog
+from .signals import FORCES, RATES, RECEIVED, UNITS, Change, ImportOptions, RawLog
 
 _LEAST_SPIKE: Final = {**dict.fromkeys(FORCES, 8.0), **dict.fromkeys(RATES, 1.0), "speed": 5.0}
 """A smaller deviation from the running median is no outlier, m/s^2, rad/s, m/s."""
@@ -57,6 +57,11 @@ def mend_spikes(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
             continue
         median = _running_median(values, log.time[known])
         deviation = np.abs(values - median)
+        # At an end, the mirrored samples pull the median away from a steep, but straight course of values.
+        for end in (np.arange(3), -1 - np.arange(3)):
+            base, slope = median[end[2]], (median[3 * end[2] - 2 * end[1]] - median[end[2]]) / 2.0
+            straight = base + slope * (np.abs(end - end[0]) - 2.0)
+            deviation[end] = np.minimum(deviation[end], np.abs(values[end] - straight))
         scales = [factor * float(np.percentile(deviation, share)) for share, factor in _SPIKE_SCALES]
         outliers = np.flatnonzero(deviation > max(least, min(scales)))
         if not len(outliers):
@@ -92,7 +97,7 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
         DataError: a sensor froze, and the options refuse gaps.
     """
     frozen: dict[tuple[int, int], list[str]] = {}
-    for name in (name for name in (*FORCES, *RATES) if name in log.signals):
+    for name in (name for name in (*FORCES, *RATES, *RECEIVED) if name in log.signals):
         for hold in _frozen(log.time, log.signals[name]):
             if _standing(log, hold, options):
                 continue
@@ -115,8 +120,9 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
 
 
 def _standing(log: RawLog, hold: tuple[int, int], options: ImportOptions) -> bool:
+    """Whether the car hardly moves for most of a hold: then all signals may hold, a course for longer."""
     speed = log.signals.get("speed", np.array([np.nan]))[hold[0] : hold[1] + 1]
-    return bool(np.any(np.isfinite(speed)) and np.nanmax(speed) < options.standstill_m_s)
+    return bool(np.any(np.isfinite(speed)) and np.nanmedian(speed) < options.standstill_m_s)
 
 
 def _frozen(time: Floats, values: Floats) -> list[tuple[int, int]]:

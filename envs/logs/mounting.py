@@ -431,6 +431,11 @@ def _notes(
                 "lateral force and yaw rate disagree; the lateral axis was mirrored, but reversed rates "
                 "would look the same and the drive may be its mirror image: a column for course decides"
             )
+    elif mounting.lateral_sign < 0 and mounting.rate_sign < 0 and options.lateral_sign == "estimate":
+        notes.append(
+            "lateral force and rates are both mirrored against the course; if the course counts "
+            "counter-clockwise, reverse its column instead"
+        )
     elif rate_course is not None and abs(rate_course) < CLEAR and options.rate_sign == "estimate":
         notes.append("the course does not show the sense of the rates; taken as it stands")
     return tuple(notes)

@@ -199,6 +199,7 @@ def check_slopes(slopes: Slopes) -> None:
 def _likely_factor(signal: str, factor: float) -> str:
     hints = {
         "speed": {3.6: "km/h (speed=COLUMN:km/h)", 2.237: "mph (speed=COLUMN:mph)", 1.944: "knots",
+                  9.80665: "x and y of the force in g (force_x=COLUMN:g)",
                   1 / 3.6: "m/s (speed=COLUMN:m/s)", 0.447: "m/s (speed=COLUMN:m/s)",
                   1.609: "mph declared as km/h", 1 / 1.609: "km/h declared as mph"},
         "rates": {57.3: "deg/s (rate_z=COLUMN:deg/s)", 1 / 57.3: "rad/s (rate_z=COLUMN:rad/s)"},

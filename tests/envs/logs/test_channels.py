@@ -129,3 +129,23 @@ def test_a_speed_of_minus_one_is_no_value(tmp_path: Path) -> None:
     result = imported(tmp_path, columns, gaps="bridge")
     assert result.findings.timing.empty_cells == 3
     assert_alike(result, imported(tmp_path, table()), 0.02)
+
+
+@pytest.mark.parametrize(("signal", "name"), [("speed", "v"), ("course", "course")])
+def test_a_receiver_that_froze(tmp_path: Path, signal: str, name: str) -> None:
+    columns = table()
+    columns[name][1000:1600] = columns[name][1000]
+    with pytest.raises(DataError, match=rf"{signal} held one value from 20.000 to 31.980 s"):
+        imported(tmp_path, columns)
+
+
+def test_a_course_that_holds_at_standstill_is_none(tmp_path: Path) -> None:
+    columns = table(0.05, standstill=10.0)
+    columns["course"][columns["v"] < 0.5] = columns["course"][0]
+    assert imported(tmp_path, columns).findings.changes == ()
+
+
+def test_a_steep_beginning_is_no_outlier(tmp_path: Path) -> None:
+    columns = {name: column[300:] for name, column in table().items()}
+    columns["ax"] = columns["ax"] + np.clip(3.0 * (1.0 - np.arange(len(columns["t"])) / 10.0), 0.0, None)
+    assert imported(tmp_path, columns).findings.changes == ()
