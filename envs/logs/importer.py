@@ -27,7 +27,7 @@ from .mounting import (
     speed_delay,
     yaw_bias,
 )
-from .plausibility import Slopes, check_fastest, check_gravity, check_slopes
+from .plausibility import Slopes, check_fastest, check_gravity, check_slopes, silent_stretches
 from .signals import (
     FORCES,
     RATES,
@@ -239,6 +239,8 @@ def _find(
             "course, or give speed_delay_s"
         )
         device = replace(device, notes=(*device.notes, note))
+    silent = silent_stretches(evidence, device.mounting)
+    device = replace(device, notes=(*device.notes, *silent))
     slopes = Slopes.of(evidence, device.mounting)
     if options.slopes == "refuse":
         check_slopes(slopes)

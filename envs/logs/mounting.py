@@ -83,6 +83,9 @@ _DELAY_STEP_S: Final = 0.02
 _LEAST_SPEED_RATE: Final = 0.25
 """Standard deviation of dv/dt below which it is noise, and shows no delay, m/s^2."""
 
+_UNMISTAKABLE: Final = 0.5
+"""Standard deviation of dv/dt from which the force has to follow it, m/s^2."""
+
 _LEAST_COURSE_RATE: Final = 0.02
 """The same of the rate of the course, rad/s."""
 
@@ -418,6 +421,8 @@ def _notes(
     options: ImportOptions,
 ) -> tuple[str, ...]:
     notes = []
+    if agreement[0] < CLEAR and evidence.speed_rate.std() >= _UNMISTAKABLE:
+        notes.append("f_x does not follow dv/dt, although the speed changes: check the columns of both")
     for found, what in zip(agreement, ("change of speed", "turning"), strict=True):
         if found < CLEAR and options.lateral_sign == "estimate":
             notes.append(f"too little {what} to check the sense of the lateral axis; taken as right-handed")

@@ -29,6 +29,12 @@ _SURE: Final = 0.7
 _LEAST_VARIATION: Final = {"force": 0.25, "heading": 0.05}
 """A slope is judged where the larger of both signals has this standard deviation, m/s^2, rad."""
 
+_WINDOW_S: Final = 8.0
+_TURNING: Final = 1.0
+_SILENT: Final = 0.35
+"""A channel may be dead in a window, s, where v r or f_y has this standard deviation, m/s^2, and the other
+less than this share of it."""
+
 _FASTEST: Final = {"speed": 120.0, **dict.fromkeys(RATES, 3.0)}
 """What no car exceeds below 0.5 Hz: m/s, rad/s."""
 
@@ -105,6 +111,26 @@ class Slopes:
             for name, found in names.items()
             if found is not None and found.judged
         ]
+
+
+def silent_stretches(evidence: Evidence, mounting: Mounting) -> list[str]:
+    """Notes on the time in which one of f_y and v r varies as in a turn, and the other does not."""
+    if evidence.speed is None:
+        return []
+    measured = mounting.force_in_car(evidence.force)[:, 1]
+    expected = turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
+    length = int(_WINDOW_S / evidence.dt)
+    found: dict[str, list[float]] = {}
+    for first in range(0, len(measured) - length + 1, length):
+        window = slice(first, first + length)
+        force, turning = float(measured[window].std()), float(expected[window].std())
+        if max(force, turning) >= _TURNING and min(force, turning) < _SILENT * max(force, turning):
+            which = ("v r varies, f_y does not", "f_y varies, v r does not")[force > turning]
+            found.setdefault(which, []).append(first * evidence.dt)
+    return [
+        f"{which}, from {times[0]:.0f} to {times[-1] + _WINDOW_S:.0f} s: a channel may be dead there"
+        for which, times in found.items()
+    ]
 
 
 def check_gravity(evidence: Evidence, options: ImportOptions) -> None:

@@ -115,3 +115,21 @@ def test_a_device_that_counts_in_a_scale_of_its_own(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"gravity is 7.8.*give gravity_m_s2"):
         imported(tmp_path, table)
     assert imported(tmp_path, table, gravity_m_s2=7.85).findings.gravity == 7.85
+
+
+def test_a_yaw_rate_that_is_dead_for_a_while_is_noted(tmp_path: Path) -> None:
+    table = Device().records(drive())
+    whole = imported(tmp_path, table).findings.device.notes
+    assert not any("may be dead" in note for note in whole)
+    for name, told in (("wz", "f_y varies, v r does not"), ("ay", "v r varies, f_y does not")):
+        first = int(np.argmax(np.diff(np.sign(table[name][1000:])) != 0)) + 1000
+        dead = {**table, name: np.where(np.arange(len(table["t"])) < first, 0.0, table[name])}
+        notes = imported(tmp_path, dead, COLUMNS, slopes="accept", yaw_deg=0.0).findings.device.notes
+        assert any(told in note for note in notes)
+
+
+def test_a_force_that_does_not_follow_the_speed_is_noted(tmp_path: Path) -> None:
+    table = Device().records(drive())
+    table["ax"] = np.roll(table["ax"], len(table["ax"]) // 4)
+    notes = imported(tmp_path, table, yaw_deg=0.0, speed_delay_s=0.0, slopes="accept").findings.device.notes
+    assert any("f_x does not follow dv/dt" in note for note in notes)
