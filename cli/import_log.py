@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.logs.signals import ImportOptions, parse_columns
-from ..envs.storage import check_file, write_bytes
+from ..envs.storage import check_file, write_bytes, write_text
 from .arguments import Whole, option, several, with_flags
 
 if TYPE_CHECKING:
@@ -38,11 +38,11 @@ class ImportCommand:
     file: Annotated[Path, option("LOG")] = field(kw_only=False)
     """Log to convert: CSV with a header row, or .csv.gz."""
     columns: Annotated[tuple[str, ...], several("SIGNAL=COLUMN[:UNIT] ...")]
-    """Columns of the signals time [s, ms, us], force_x force_y force_z [m/s2, g], rate_x rate_y rate_z
-    [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
+    """Columns of the signals time [s, ms, us, ns, hhmmss], force_x force_y force_z [m/s2, g], rate_x rate_y
+    rate_z [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
     before a column reverses it; a number instead of one is a constant. Speed and course may be missing."""
     out: Annotated[Path, option("FILE")]
-    """Cues to write, as CSV; packed if the name ends in .gz."""
+    """Cues to write, as CSV; packed if the name ends in .gz. Its .findings.txt is written beside it."""
     plot: Annotated[Path | None, option("FILE.png")] = None
     """Picture (PNG) to write: cues against the car's own motion, raw signals, spectra."""
     decimals: Whole | None = None
@@ -58,18 +58,26 @@ def run(command: ImportCommand) -> int:
     if command.out.resolve() == command.file.resolve():
         raise ConfigurationError(f"--out {command.out} is the log itself; name another file")
     check_file("--out", command.out)
+    name = command.out.name.removesuffix(".gz").removesuffix(".csv")
+    findings = command.out.with_name(f"{name}.findings.txt")
+    if findings.resolve() == command.file.resolve():
+        raise ConfigurationError(
+            f"--out {command.out}: its findings would overwrite the log; name another file"
+        )
+    check_file("--out", findings)
     if command.plot is not None:
         _check_plot(command.plot, command)
     from ..envs.logs.importer import import_log
 
     columns, units = parse_columns(command.columns)
-    name = command.out.name.removesuffix(".gz").removesuffix(".csv")
     try:
         imported = import_log(command.file, columns, units=units, options=command.conversion, name=name)
     except DataError as error:
         raise DataError(with_flags(str(error), [one.name for one in fields(ImportOptions)])) from None
     imported.trace.to_csv(command.out, decimals=command.decimals)
-    print("\n".join(imported.findings.lines()))
+    lines = "\n".join(imported.findings.lines())
+    write_text(findings, lines + "\n")
+    print(lines)
     print(f"{command.out}: {len(imported.trace)} samples, {imported.trace.duration:.1f} s")
     if command.plot is not None:
         write_bytes(command.plot, import_plot(imported))
@@ -86,7 +94,10 @@ def _check_plot(plot: Path, command: ImportCommand) -> None:
 
 
 def import_plot(imported: ImportedLog) -> bytes:
-    """PNG with the cues against the car's own motion, the raw signals, and spectra before and after."""
+    """PNG with the cues against the car's own motion, the raw signals, and spectra before and after.
+
+    A dotted line in the raw signals marks each place that was changed.
+    """
     from ..evaluation.reporting.figures import new_figure, png, styled
 
     with styled():
@@ -115,6 +126,9 @@ def _draw(figure: Figure, imported: ImportedLog) -> None:
     _compare(axes[2, 0], trace.time, trace.specific_force[:, 2], rest, ("f_z", "at rest"))
     _lines(axes[2, 1], trace.time, np.degrees(trace.angular_velocity), ("p", "q", "r"), "rates, deg/s")
     _lines(axes[3, 0], trace.time, imported.raw_force, ("x", "y", "z"), "raw, device axes, m/s²")
+    for change in imported.findings.changes:
+        for place in change.places:
+            axes[3, 0].axvline(place, color="#aa3333", linestyle=":", linewidth=0.8, gid="changed")
     _spectra(axes[3, 1], imported)
 
 

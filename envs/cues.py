@@ -230,6 +230,9 @@ def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, 
     """
     header, rows = _read_rows(path)
     names = header if columns is None else columns
+    repeated = sorted({name for name in names if header.count(name) > 1})
+    if repeated:
+        raise DataError(f"{path}: column {', '.join(repeated)} occurs more than once")
     missing = [name for name in names if name not in header]
     if missing:
         raise DataError(f"{path}: missing column {', '.join(missing)}; found {', '.join(header)}")
@@ -256,10 +259,12 @@ def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]
         )
     if all(map(_is_number, header)):
         raise DataError(f"{path}: the first row must be the names of the columns, found numbers")
-    repeated = {name for name in header if header.count(name) > 1}
-    if repeated:
-        raise DataError(f"{path}: column {', '.join(sorted(repeated))} occurs more than once")
     for line, row in rows[1:]:
+        if len(row) != len(header) == 1:
+            raise DataError(
+                f"{path}: the first line, {header[0]!r}, is no header of columns; remove the lines above the "
+                "header, and save the file with commas between the columns"
+            )
         if len(row) != len(header):
             raise DataError(f"{path}: line {line} has {len(row)} cells, the header has {len(header)}")
     return header, rows[1:]

@@ -4,18 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
-from .mounting import Estimate, estimate, gather, shift, speed_delay
+from .channels import check_speed, check_standstill, drop_frozen, mend_spikes
+from .mounting import (
+    CLEAR,
+    LONGEST_DELAY_S,
+    Estimate,
+    Mounting,
+    correlation,
+    detrended,
+    estimate,
+    gather,
+    shift,
+    speed_delay,
+    yaw_bias,
+)
+from .plausibility import Slopes, check_fastest, check_gravity, check_slopes, silent_stretches
 from .signals import (
     FORCES,
     RATES,
+    REQUIRED,
+    Change,
     Grid,
     ImportOptions,
     RawLog,
@@ -26,6 +43,7 @@ from .signals import (
     on_grid,
     read_log,
 )
+from .timing import in_order
 
 SPEED_CUTOFF_HZ: Final = 1.0
 """Cut-off of the speed channel, Hz: satellite and wheel speeds come in steps of about a tenth of a second."""
@@ -38,14 +56,18 @@ class Findings:
     Attributes:
         timing: Sample times and gaps.
         device: Mounting, biases and correlations.
+        slopes: How steeply force and heading follow speed and course.
         speed_delay: How long the speed lags behind the force, s.
         gravity: Gravity as the device measures it, m/s^2.
+        changes: What was mended in the log, by choice, with places in the trace's time.
     """
 
     timing: Timing
     device: Estimate
+    slopes: Slopes
     speed_delay: float
     gravity: float
+    changes: tuple[Change, ...] = ()
 
     def lines(self) -> list[str]:
         """A report for people, angles in degrees."""
@@ -65,6 +87,8 @@ class Findings:
             f"f_x with dv/dt     correlation {d.force_speed:.3f}",
             f"f_y with v r       correlation {d.force_turn:.3f}",
             f"heading, course    correlation {course}",
+            *self.slopes.lines(),
+            *(f"changed            {change.text}" for change in self.changes),
             *(f"note               {note}" for note in d.notes),
         ]
 
@@ -114,11 +138,24 @@ def import_log(
         DataError: the log is broken, or does not show what has to be estimated.
     """
     options = options or ImportOptions()
-    log = _cut(read_log(path, columns, units or {}), options)
+    computed = options.force == "from-speed"
+    required = ("time", "speed", *RATES) if computed else REQUIRED
+    log, changes = in_order(read_log(path, columns, units or {}, required), options)
+    log = _cut(log, options)
+    for mend in (mend_spikes, drop_frozen):
+        log, mended = mend(log, options)
+        changes += mended
+    check_speed(log)
     series, timing = close_gaps(log, options)
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
     raw = {signal: on_grid(values, grid) for signal, values in series.items()}
-    findings = _find(raw, grid, timing, options)
+    if computed:
+        raw, options, change = _with_force(raw, grid, options)
+        changes.append(change)
+    elif options.gravity == "add":
+        raw, options, change = _with_gravity(raw, options)
+        changes.append(change)
+    findings = _find(raw, grid, timing, changes, units or {}, options)
     return ImportedLog(
         trace=_trace(name or Path(path).stem, str(Path(path).name), raw, grid, findings, options),
         findings=findings,
@@ -127,7 +164,61 @@ def import_log(
     )
 
 
-def _find(raw: Mapping[str, Floats], grid: Grid, timing: Timing, options: ImportOptions) -> Findings:
+def _with_force(
+    raw: Mapping[str, Floats], grid: Grid, options: ImportOptions
+) -> tuple[dict[str, Floats], ImportOptions, Change]:
+    """Signals with f = dv/dt + omega x v - g of a car that moves along its x axis, and its options."""
+    rate = _stacked(raw, RATES)
+    course = raw.get("course")
+    evidence = gather(grid.rate_hz, np.zeros_like(rate), rate, raw["speed"], course, options.standstill_m_s)
+    sign = {"keep": 1, "flip": -1}.get(options.rate_sign, 1)
+    if options.rate_sign == "estimate" and evidence.course is not None:
+        heading = detrended(np.cumsum(evidence.rate[:, 2]) * evidence.dt)
+        sign = -1 if correlation(heading, detrended(evidence.course)) < -CLEAR else 1
+    speed = low_pass(raw["speed"], grid.rate_hz, min(SPEED_CUTOFF_HZ, options.cutoff_hz))
+    yaw_rate = sign * (rate[:, 2] - yaw_bias(evidence, evidence.rate[:, 2]))
+    pitch_rate = sign * (rate[:, 1] - rate[:, 1].mean())
+    force = {
+        "force_x": np.gradient(speed, 1.0 / grid.rate_hz),
+        "force_y": speed * yaw_rate,
+        "force_z": -speed * pitch_rate - GRAVITY,
+    }
+    aligned = replace(
+        options,
+        roll_deg=0.0,
+        pitch_deg=0.0,
+        yaw_deg=0.0,
+        lateral_sign="keep",
+        rate_sign="flip" if sign < 0 else "keep",
+        gravity_m_s2=GRAVITY,
+        speed_delay_s=options.speed_delay_s or 0.0,
+    )
+    return (
+        {**raw, **force},
+        aligned,
+        Change("force not measured: computed as dv/dt + omega x v, with gravity"),
+    )
+
+
+def _with_gravity(
+    raw: Mapping[str, Floats], options: ImportOptions
+) -> tuple[dict[str, Floats], ImportOptions, Change]:
+    """Signals with the force of gravity at the attitude given, or at none, which then holds."""
+    roll, pitch = options.roll_deg or 0.0, options.pitch_deg or 0.0
+    rest = Mounting(math.radians(roll), math.radians(pitch)).matrix.T @ [0.0, 0.0, -GRAVITY]
+    added = {name: raw[name] + rest[axis] for axis, name in enumerate(FORCES)}
+    change = Change(f"gravity added, for a device at roll {roll:g}, pitch {pitch:g} deg")
+    return {**raw, **added}, replace(options, roll_deg=roll, pitch_deg=pitch), change
+
+
+def _find(
+    raw: Mapping[str, Floats],
+    grid: Grid,
+    timing: Timing,
+    changes: list[Change],
+    units: Mapping[str, str],
+    options: ImportOptions,
+) -> Findings:
     evidence = gather(
         grid.rate_hz,
         _stacked(raw, FORCES),
@@ -136,10 +227,27 @@ def _find(raw: Mapping[str, Floats], grid: Grid, timing: Timing, options: Import
         raw.get("course"),
         options.standstill_m_s,
     )
+    check_fastest(evidence, units)
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
-    device = estimate(evidence.delayed(delay), options)
+    evidence = evidence.delayed(delay)
+    check_gravity(evidence, options)
+    check_standstill(evidence)
+    device = estimate(evidence, options)
+    if options.speed_delay_s is None and delay >= LONGEST_DELAY_S - 1e-6:
+        note = (
+            f"the delay of the speed is at the end of its range of {LONGEST_DELAY_S:g} s: check speed and "
+            "course, or give speed_delay_s"
+        )
+        device = replace(device, notes=(*device.notes, note))
+    silent = silent_stretches(evidence, device.mounting)
+    device = replace(device, notes=(*device.notes, *silent))
+    slopes = Slopes.of(evidence, device.mounting)
+    if options.slopes == "refuse":
+        check_slopes(slopes)
     gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
-    return Findings(timing, device, delay, gravity)
+    return Findings(
+        timing, device, slopes, delay, gravity, tuple(change.later(grid.start) for change in changes)
+    )
 
 
 def _trace(
@@ -178,13 +286,21 @@ def _cut(log: RawLog, options: ImportOptions) -> RawLog:
         raise DataError(f"start_s={options.start_s:g}: no rows are left; the log has {len(log.time)}")
     signals = {name: values[keep] for name, values in log.signals.items()}
     if "course" in signals:
-        signals["course"] = _unwrapped(signals["course"])
-    return RawLog(log.time[keep], signals, log.rows[keep], log.time_unit)
+        signals["course"] = _unwrapped(signals["course"], log.rows[keep])
+    return replace(log, time=log.time[keep], signals=signals, rows=log.rows[keep])
 
 
-def _unwrapped(course: Floats) -> Floats:
+def _unwrapped(course: Floats, rows: NDArray[np.intp]) -> Floats:
     """Course (n,) without jumps of a full turn; NaN stays NaN."""
-    known = np.isfinite(course)
+    known = np.flatnonzero(np.isfinite(course))
+    steps = np.abs(np.diff(course[known]))
+    # The step across north is less than a full turn.
+    if np.any(steps > 1.1 * math.tau):
+        at = int(np.argmax(steps > 1.1 * math.tau))
+        raise DataError(
+            f"course jumps by {steps[at]:.4g} rad at data row {rows[known[at + 1]]}: its unit is not rad; "
+            "declare course=COLUMN:deg, or mend the log"
+        )
     result = course.copy()
     result[known] = np.unwrap(course[known])
     return result

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ..cues import Floats
 from ..errors import DataError
-from .signals import ImportOptions, Sign, low_pass
+from .signals import FORCES, ImportOptions, Sign, low_pass
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,18 @@ LONGEST_DELAY_S: Final = 2.0
 """Delay of a speed (satellite receivers average) searched for, s."""
 
 _DELAY_STEP_S: Final = 0.02
+_LEAST_SPEED_RATE: Final = 0.25
+"""Standard deviation of dv/dt below which it is noise, and shows no delay, m/s^2."""
+
+_UNMISTAKABLE: Final = 0.5
+"""Standard deviation of dv/dt from which the force has to follow it, m/s^2."""
+
+_LEAST_COURSE_RATE: Final = 0.02
+"""The same of the rate of the course, rad/s."""
+
+_CONSTANT: Final = 1e-6
+"""A force that varies by less is a constant, m/s^2."""
+
 _WEAK_FIT: Final = 0.1
 """Share of the variance of dv/dt that the force must explain before a delay is believed."""
 
@@ -154,16 +166,25 @@ def shift(values: Floats, delay: float, dt: float) -> Floats:
 
 
 def speed_delay(evidence: Evidence) -> float:
-    """How long the speed lags behind the force, s: where the force explains most of dv/dt.
+    """How long speed and course lag behind force and rates, s.
 
-    The forward axis is not known yet, so dv/dt is regressed on all three axes.
+    The forward axis is not known yet, so dv/dt is regressed on all three axes of the force. At constant
+    speed, the rate of the course is regressed on all three axes of the rates. A signal that hardly varies
+    shows no delay.
     """
-    if evidence.speed is None:
-        return 0.0
-    regressors = np.column_stack([evidence.force, np.ones(len(evidence.force))])
-    basis = np.linalg.qr(regressors)[0]
+    if evidence.speed is not None and evidence.speed_rate.std() >= _LEAST_SPEED_RATE:
+        return _best_delay(evidence.force, evidence.speed_rate, evidence.dt)
+    if evidence.course is not None:
+        turning = np.gradient(evidence.course, evidence.dt)
+        if turning.std() >= _LEAST_COURSE_RATE:
+            return _best_delay(evidence.rate, turning, evidence.dt)
+    return 0.0
+
+
+def _best_delay(axes: Floats, target: Floats, dt: float) -> float:
+    basis = np.linalg.qr(np.column_stack([axes, np.ones(len(axes))]))[0]
     delays = np.arange(0.0, LONGEST_DELAY_S + _DELAY_STEP_S / 2, _DELAY_STEP_S)
-    fits = [_explained(basis, shift(evidence.speed_rate, delay, evidence.dt)) for delay in delays]
+    fits = [_explained(basis, shift(target, delay, dt)) for delay in delays]
     best = int(np.argmax(fits))
     return float(delays[best]) if fits[best] > _WEAK_FIT else 0.0
 
@@ -223,12 +244,13 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     Raises:
         DataError: the yaw of the mounting is not given and the record does not show it.
     """
-    rest, rest_from = _rest(evidence)
+    rest, rest_from = rest_force(evidence)
     roll, pitch = (
         found if given is None else math.radians(given)
         for given, found in zip((options.roll_deg, options.pitch_deg), level(rest), strict=True)
     )
     leveled = Mounting(roll, pitch)
+    _check_constants(evidence, rest, options)
     rate_sign, rate_course = _rate_sign(evidence, leveled, options.rate_sign)
     yaw, lateral_sign = _heading(evidence, leveled, rate_sign, options)
     mounting = Mounting(roll, pitch, yaw, lateral_sign, rate_sign)
@@ -248,25 +270,65 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
         force_speed=force_speed,
         force_turn=force_turn,
         rate_course=rate_course,
-        notes=_notes(mounting, rate_course, force_turn, options),
+        notes=_notes(mounting, rate_course, (force_speed, force_turn), evidence, options),
     )
 
 
-def _rest(evidence: Evidence) -> tuple[Floats, Origin]:
+def _check_constants(evidence: Evidence, rest: Floats, options: ImportOptions) -> None:
+    """Refuse to estimate the yaw of the mounting from a horizontal force that is missing."""
+    if options.yaw_deg is not None:
+        return
+    turning = turn(evidence, evidence.rate @ (-rest / np.linalg.norm(rest)))
+    excited = min(evidence.speed_rate.std(), turning.std()) >= _LEAST_SPEED_RATE
+    for name, values, part in zip(FORCES, evidence.force.T, rest / np.linalg.norm(rest), strict=True):
+        if excited and np.ptp(values) < _CONSTANT and abs(part) < math.sqrt(0.5):
+            raise DataError(
+                f"{name} is constant in a drive that speeds up and turns: it does not show how the device is "
+                "turned in the car; name its column, or give yaw_deg"
+            )
+
+
+def rest_force(evidence: Evidence) -> tuple[Floats, Origin]:
     """Specific force without the car's own acceleration: at rest, or as the constant of a regression."""
     if evidence.still.sum() * evidence.dt >= _STILL_S:
         return evidence.force[evidence.still].mean(axis=0), "standstill"
     mean = evidence.force.mean(axis=0)
-    turning = _turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
-    regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning])
+    if weightless(evidence.force):
+        return mean, "average"
+    turning = turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
+    # A car that leans by an angle in proportion to v r has a vertical force that varies with its square.
+    regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning, turning**2])
     return np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0], "average"
 
 
-def _turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
-    """The product v r (n,), without the bias of r as far as its mean shows it."""
+def weightless(force: Floats) -> bool:
+    """Whether a force (n, 3) lacks gravity, in any unit: its mean is then small beside its size."""
+    return bool(np.linalg.norm(force.mean(axis=0)) < 0.7 * np.linalg.norm(force, axis=1).mean())
+
+
+def turn(evidence: Evidence, yaw_rate: Floats) -> Floats:
+    """The product v r (n,), without the bias of r as far as the record shows it."""
     if evidence.speed is None:
         return np.zeros(len(yaw_rate))
-    return np.asarray(evidence.speed * (yaw_rate - yaw_rate.mean()))
+    return np.asarray(evidence.speed * (yaw_rate - yaw_bias(evidence, yaw_rate)))
+
+
+def yaw_bias(evidence: Evidence, yaw_rate: Floats) -> float:
+    """Bias of a yaw rate (n,) of unknown sense: at standstill, or as its drift against the course.
+
+    The mean is no bias: a drive may turn more one way than the other.
+    """
+    if evidence.still.sum() * evidence.dt >= _STILL_S:
+        return float(yaw_rate[evidence.still].mean())
+    if evidence.course is None:
+        return 0.0
+    heading = np.cumsum(yaw_rate) * evidence.dt
+    time = evidence.dt * np.arange(len(heading))
+    alike = correlation(detrended(heading), detrended(evidence.course))
+    # A course that is close to a straight line does not show the sense; the smaller bias is likelier.
+    senses = (1.0, -1.0) if abs(alike) < CLEAR else (float(np.sign(alike)),)
+    biases = [float(np.polyfit(time, heading - sense * evidence.course, 1)[0]) for sense in senses]
+    return min(biases, key=abs)
 
 
 def _rate_sign(evidence: Evidence, leveled: Mounting, choice: Sign) -> tuple[int, float | None]:
@@ -274,12 +336,13 @@ def _rate_sign(evidence: Evidence, leveled: Mounting, choice: Sign) -> tuple[int
     if evidence.course is None:
         return _chosen(choice, 1), None
     heading = np.cumsum(leveled.rate_in_car(evidence.rate)[:, 2]) * evidence.dt
-    found = correlation(_detrended(heading), _detrended(evidence.course))
+    found = correlation(detrended(heading), detrended(evidence.course))
     sign = _chosen(choice, -1 if found < -CLEAR else 1)
     return sign, sign * found
 
 
-def _detrended(values: Floats) -> Floats:
+def detrended(values: Floats) -> Floats:
+    """Values (n,) without their straight line."""
     # A straight line is what the bias of a rate leaves in its integral.
     time = np.linspace(-1.0, 1.0, len(values))
     slope, offset = np.polyfit(time, values, 1)
@@ -297,7 +360,7 @@ def _heading(
     force = leveled.force_in_car(evidence.force)[:, :2]
     x, y = (force - force.mean(axis=0)).T
     along = evidence.speed_rate - evidence.speed_rate.mean()
-    across = _turn(evidence, rate_sign * leveled.rate_in_car(evidence.rate)[:, 2])
+    across = turn(evidence, rate_sign * leveled.rate_in_car(evidence.rate)[:, 2])
     across = across - across.mean()
 
     def fit(sign: int) -> tuple[float, float]:
@@ -320,7 +383,7 @@ def _heading(
 def _agreement(evidence: Evidence, mounting: Mounting) -> tuple[float, float]:
     """Correlations of f_x with dv/dt, and of f_y with v r."""
     force = mounting.force_in_car(evidence.force)
-    turning = _turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
+    turning = turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
     return correlation(force[:, 0], evidence.speed_rate), correlation(force[:, 1], turning)
 
 
@@ -337,7 +400,12 @@ def _rate_bias(
     rate = mounting.rate_in_car(evidence.rate)
     if evidence.still.sum() * evidence.dt >= _STILL_S:
         return rate[evidence.still].mean(axis=0), ("standstill", "standstill")
-    bias = rate.mean(axis=0)
+    turning = turn(evidence, rate[:, 2])
+    leaning = turning * (rate[:, 2] - yaw_bias(evidence, rate[:, 2]))
+    # A car that leans in a turn has a pitch rate of r sin(roll), whose mean is no bias.
+    regressors = np.column_stack([np.ones(len(rate)), leaning])
+    pitch_bias = np.linalg.lstsq(regressors, rate[:, 1], rcond=None)[0][0]
+    bias = np.array([rate[:, 0].mean(), pitch_bias, rate[:, 2].mean()])
     if evidence.course is None:
         return np.array([bias[0], bias[1], 0.0]), ("average", "not estimated")
     drift = np.cumsum(rate[:, 2]) * evidence.dt - evidence.course
@@ -346,11 +414,21 @@ def _rate_bias(
 
 
 def _notes(
-    mounting: Mounting, rate_course: float | None, force_turn: float, options: ImportOptions
+    mounting: Mounting,
+    rate_course: float | None,
+    agreement: tuple[float, float],
+    evidence: Evidence,
+    options: ImportOptions,
 ) -> tuple[str, ...]:
     notes = []
-    if force_turn < CLEAR and options.lateral_sign == "estimate":
-        notes.append("too little turning to check the sense of the lateral axis; taken as right-handed")
+    if agreement[0] < CLEAR and evidence.speed_rate.std() >= _UNMISTAKABLE:
+        notes.append("f_x does not follow dv/dt, although the speed changes: check the columns of both")
+    for found, what in zip(agreement, ("change of speed", "turning"), strict=True):
+        if found < CLEAR and options.lateral_sign == "estimate":
+            notes.append(f"too little {what} to check the sense of the lateral axis; taken as right-handed")
+    standing = evidence.still.sum() * evidence.dt >= _STILL_S
+    if not standing and evidence.course is None and options.rate_bias_deg_s is None:
+        notes.append("neither standstill nor course: the bias of the yaw rate is taken as zero")
     if rate_course is None and options.rate_sign == "estimate":
         notes.append("no course: the sense of the rates is taken as it stands")
         if mounting.lateral_sign < 0:
@@ -358,6 +436,11 @@ def _notes(
                 "lateral force and yaw rate disagree; the lateral axis was mirrored, but reversed rates "
                 "would look the same and the drive may be its mirror image: a column for course decides"
             )
+    elif mounting.lateral_sign < 0 and mounting.rate_sign < 0 and options.lateral_sign == "estimate":
+        notes.append(
+            "lateral force and rates are both mirrored against the course; if the course counts "
+            "counter-clockwise, reverse its column instead"
+        )
     elif rate_course is not None and abs(rate_course) < CLEAR and options.rate_sign == "estimate":
         notes.append("the course does not show the sense of the rates; taken as it stands")
     return tuple(notes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -39,7 +39,14 @@ class ImportOptions:
     """What comes later in the log is left out, s from its first stamp."""
 
     gaps: Literal["refuse", "bridge"] = "refuse"
-    """Refuse missing data (long steps, repeated stamps, empty cells), or bridge it by interpolation."""
+    """Refuse missing data (long steps, repeated stamps, empty cells, frozen sensors), or bridge it by
+    interpolation."""
+
+    clock: Literal["refuse", "mend"] = "refuse"
+    """Refuse a clock that wraps (a day, 32 bits of us), or mend it: unwrap its stamps."""
+
+    spikes: Literal["refuse", "median"] = "refuse"
+    """Refuse outliers of up to three samples, or replace them by the median of their neighbors."""
 
     longest_step_s: Positive = 0.2
     """A longer step between samples is a gap, s."""
@@ -64,6 +71,16 @@ class ImportOptions:
 
     rate_sign: Sign = "estimate"
     """Whether the angular rates are reversed; estimated from the course, if there is one."""
+
+    slopes: Literal["refuse", "accept"] = "refuse"
+    """Refuse a log whose slopes (f_x on dv/dt, f_y on v r, heading on course) are far from 1, or accept."""
+
+    force: Literal["measured", "from-speed"] = "measured"
+    """Whether the log has a force. From speed, it is dv/dt + omega x v with gravity, for rates about
+    the car's own axes on a level road."""
+
+    gravity: Literal["measured", "add"] = "measured"
+    """Whether the force contains gravity. If it is to be added, roll and pitch are those given, or zero."""
 
     gravity_m_s2: Positive | None = None
     """Gravity as the device measures it; estimated if not given. The difference to 9.81 is taken as a
@@ -95,13 +112,25 @@ _FORCE_UNITS: Final = {"m/s2": 1.0, "g": 9.80665}
 _RATE_UNITS: Final = {"rad/s": 1.0, "deg/s": math.radians(1.0)}
 
 UNITS: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "hhmmss": 1.0},
     **dict.fromkeys(FORCES, _FORCE_UNITS),
     **dict.fromkeys(RATES, _RATE_UNITS),
     "speed": {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704},
     "course": {"rad": 1.0, "deg": math.radians(1.0)},
 }
 """Signals an import knows, each with its units and their SI values; the first unit is the default."""
+
+_NO_SPEED: Final = -1.0
+"""What receivers without a fix give for the speed, where it is the only negative value."""
+
+RECEIVED: Final = ("speed", "course")
+"""Signals of a receiver, which may have a lower rate than the rows of the log."""
+
+_SPARSE: Final = 0.6
+"""A signal with a smaller share of filled cells has a rate of its own."""
+
+_SPARSE_STEPS: Final = 2.5
+"""Such a signal has a gap where a step exceeds so many of its median steps."""
 
 REQUIRED: Final = ("time", *FORCES, *RATES)
 """Signals an import cannot do without."""
@@ -116,12 +145,31 @@ class RawLog:
         signals: Each (n,), SI units, device axes; NaN where a cell was empty.
         rows: (n,) number of each data row in the file, from 1, for messages.
         time_unit: Of the time column, for messages.
+        first_stamp_s: First stamp as the log counts it, s.
     """
 
     time: Floats
     signals: Mapping[str, Floats]
     rows: NDArray[np.intp]
     time_unit: str = "s"
+    first_stamp_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """What was mended in a log, by choice.
+
+    Attributes:
+        text: For people, with rows and times of the log.
+        places: Times at which values were changed, s; empty where all were.
+    """
+
+    text: str
+    places: tuple[float, ...] = ()
+
+    def later(self, start: float) -> Change:
+        """The change in a time that begins at ``start`` of this one."""
+        return replace(self, places=tuple(place - start for place in self.places))
 
 
 def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -146,7 +194,12 @@ def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]
     return columns, units
 
 
-def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, str]) -> RawLog:
+def read_log(
+    path: str | Path,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    required: tuple[str, ...] = REQUIRED,
+) -> RawLog:
     """Read the named columns of a CSV file and convert them to SI units.
 
     Args:
@@ -154,12 +207,13 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
         columns: Column of each signal. A leading ``-`` reverses it; a number instead of a
             column stands for a constant, in the same unit.
         units: Unit of each signal; SI where none is given.
+        required: Signals that need a column.
 
     Raises:
         ConfigurationError: a signal or unit is unknown, or a required signal has no column.
         DataError: the file cannot be read, or a column is missing or holds text.
     """
-    factors = _factors(columns, units)
+    factors = _factors(columns, units, required)
     table = read_table(path, sorted({_bare(c) for c in columns.values() if _constant(c) is None}))
     n = len(next(iter(table.values())))
 
@@ -167,21 +221,41 @@ def read_log(path: str | Path, columns: Mapping[str, str], units: Mapping[str, s
         column = columns[name]
         constant = _constant(column)
         values = table[_bare(column)] if constant is None else np.full(n, constant)
+        negative = values < 0.0
+        if name == "speed" and np.all(values[negative] == _NO_SPEED):
+            values = np.where(negative, np.nan, values)
         return values * (-factors[name] if constant is None and column.startswith("-") else factors[name])
 
     stamps = table[_bare(columns["time"])]
     if not np.any(np.isfinite(stamps)):
         raise DataError(f"{path}: column {columns['time']} holds no time stamp")
+    if units.get("time") == "hhmmss":
+        stamps = _seconds_of_day(stamps, str(path))
     # Subtracting before scaling keeps the digits of stamps counted from 1970.
-    time = (stamps - stamps[np.isfinite(stamps)][0]) * factors["time"]
+    first = float(stamps[np.isfinite(stamps)][0])
+    time = (stamps - first) * factors["time"]
     signals = {name: signal(name) for name in columns if name != "time"}
-    return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"))
+    return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"), first * factors["time"])
 
 
-def _factors(columns: Mapping[str, str], units: Mapping[str, str]) -> dict[str, float]:
+def _seconds_of_day(stamps: Floats, path: str) -> Floats:
+    """Seconds since midnight of clock times such as 95850.04, 9:58:50.04."""
+    hours, minutes, seconds = stamps // 1e4, stamps // 100.0 % 100.0, stamps % 100.0
+    wrong = np.flatnonzero((hours >= 24.0) | (minutes >= 60.0) | (seconds >= 60.0) | (stamps < 0.0))
+    if len(wrong):
+        raise DataError(
+            f"{path}: the time {stamps[wrong[0]]:.10g} at data row {wrong[0] + 1} is no HHMMSS; declare "
+            "another unit, time=COLUMN:s"
+        )
+    return np.asarray(hours * 3600.0 + minutes * 60.0 + seconds)
+
+
+def _factors(
+    columns: Mapping[str, str], units: Mapping[str, str], required: tuple[str, ...]
+) -> dict[str, float]:
     for name in (*columns, *units):
         _check_signal(name)
-    missing = [name for name in REQUIRED if name not in columns]
+    missing = [name for name in required if name not in columns]
     if missing:
         raise ConfigurationError(
             f"no column for {', '.join(missing)}; name one with signal=column, or give a constant"
@@ -263,8 +337,11 @@ def close_gaps(log: RawLog, options: ImportOptions) -> tuple[dict[str, Series], 
         name: _without_holes(name, (time, values[keep]), rows, options)
         for name, values in log.signals.items()
     }
-    likely = _likely_unit(time, log.time_unit)
-    bridged = sum(_bridge(name, stamps, options, likely) for name, (stamps, _) in series.items())
+    likely = _likely_unit(time, log.time_unit, log.first_stamp_s)
+    sparse = [name for name, values in log.signals.items() if _sparse(name, np.isfinite(values[keep]))]
+    bridged = sum(
+        _bridge(name, stamps, options, likely, name in sparse) for name, (stamps, _) in series.items()
+    )
     steps = np.diff(time)
     cells = sum(int(np.isnan(values[keep]).sum()) for values in log.signals.values())
     return series, Timing(
@@ -289,7 +366,7 @@ def _kept_rows(log: RawLog, options: ImportOptions) -> NDArray[np.intp]:
     _refuse(options, log.rows[known[1:][steps == 0.0]], "time stamp repeats")
     kept = np.concatenate([known[:1], known[1:][steps > 0.0]])
     if len(kept) < 2 or time[kept[-1]] - time[kept[0]] < _SHORTEST_S:
-        likely = _likely_unit(time[kept], log.time_unit) or "; name a longer one"
+        likely = _likely_unit(time[kept], log.time_unit, log.first_stamp_s) or "; name a longer one"
         raise DataError(f"the log is shorter than {_SHORTEST_S:g} s{likely}")
     return kept
 
@@ -299,17 +376,25 @@ def _without_holes(name: str, series: Series, rows: NDArray[np.intp], options: I
     if np.any(np.isinf(values)):
         raise DataError(f"{name} is infinite at data row {rows[np.isinf(values)][0]}; mend the log")
     known = np.isfinite(values)
-    _refuse(options, rows[~known], f"{name} has an empty or NaN cell")
+    if not _sparse(name, known):
+        _refuse(options, rows[~known], f"{name} has an empty or NaN cell")
     if known.sum() < 2:
         raise DataError(f"{name} has fewer than 2 values; name another column")
     return time[known], values[known]
 
 
-def _likely_unit(time: Floats, unit: str) -> str:
+def _sparse(name: str, known: NDArray[np.bool_]) -> bool:
+    """Whether a signal comes at a rate of its own, as a receiver's does, and leaves other cells empty."""
+    return name in RECEIVED and bool(known.mean() < _SPARSE)
+
+
+def _likely_unit(time: Floats, unit: str, first: float) -> str:
     """The unit that the time stamps probably have, as the end of a message; nothing if theirs will do."""
     if len(time) < 2:
         return ""
     step, known = float(np.median(np.diff(time))), UNITS["time"]
+    if unit == "s" and _clock_time(time + first, step):
+        return ": the time looks like HHMMSS, which jumps at each minute; declare time=COLUMN:hhmmss"
     least, most = _USUAL_STEP_S
     if least <= step <= most:
         return ""
@@ -318,14 +403,28 @@ def _likely_unit(time: Floats, unit: str) -> str:
     return f"{said} It looks like {likely[0]} (time=COLUMN:{likely[0]})" if likely else said
 
 
-def _bridge(name: str, time: Floats, options: ImportOptions, likely: str) -> int:
+def _clock_time(stamps: Floats, step: float) -> bool:
+    """Whether each stamp (n,) reads as HHMMSS, and each minute and hour that ends makes the jump of that."""
+    steps = np.diff(stamps)
+    jumps = np.abs((steps + 0.5) % 100.0 - 40.5) <= 2.0 * step + 0.5
+    return bool(
+        step < 10.0
+        and np.all(stamps % 100.0 < 60.0)
+        and np.all(stamps // 100.0 % 100.0 < 60.0)
+        and np.all(jumps[steps > 10.0])
+        and np.any(jumps & (steps > 10.0))
+    )
+
+
+def _bridge(name: str, time: Floats, options: ImportOptions, likely: str, sparse: bool) -> int:
     steps = np.diff(time)
-    long = steps > options.longest_step_s
+    longest = max(options.longest_step_s, _SPARSE_STEPS * float(np.median(steps)) if sparse else 0.0)
+    long = steps > longest
     if options.gaps == "refuse" and np.any(long):
         at = int(np.argmax(long))
         raise DataError(
             f"gap of {steps[at]:.3g} s in {name} at {time[at]:.3f} s "
-            f"(longest_step_s={options.longest_step_s:g})"
+            + (f"(its usual step is {np.median(steps):.3g} s)" if sparse else f"(longest_step_s={longest:g})")
             + (likely or "; set gaps='bridge', or leave it out with start_s or end_s")
         )
     if steps.max() > options.longest_gap_s:

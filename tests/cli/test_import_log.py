@@ -216,3 +216,29 @@ def test_complaints_name_the_options_of_the_command_line(tmp_path, capsys) -> No
     assert "give --yaw-deg, or name a column" in capsys.readouterr().err
     assert main(["import", "nowhere.csv", *words[2:]]) == 2
     assert capsys.readouterr().err.endswith("nowhere.csv: cannot be read (there is no such file)\n")
+
+
+def test_changes_are_printed_written_beside_the_cues_and_drawn(tmp_path, capsys, monkeypatch) -> None:
+    table = Device(yaw=0.5).records(drive())
+    table["ay"][1000] = 50.0
+    out = tmp_path / "cues.csv.gz"
+    words = ["import", str(write(tmp_path / "log.csv", table)), "--columns", *TEXTS, "--out", str(out)]
+    assert main(words) == 2
+    assert "set --spikes median" in capsys.readouterr().err
+    assert not (tmp_path / "cues.findings.txt").exists()
+    figures = []
+    monkeypatch.setattr(
+        "motion_cueing.evaluation.reporting.figures.png", lambda one: figures.append(one) or b""
+    )
+    assert main([*words, "--spikes", "median", "--plot", str(tmp_path / "plot.png")]) == 0
+    change = "force_y is 50 m/s2 at data row 1001 (20.000 s)"
+    assert change in capsys.readouterr().out
+    assert change in (tmp_path / "cues.findings.txt").read_text()
+    marks = [line for line in figures[0].axes[6].get_lines() if line.get_gid() == "changed"]
+    assert [line.get_xdata()[0] for line in marks] == pytest.approx([20.0])
+
+
+def test_findings_never_overwrite_the_log(tmp_path: Path) -> None:
+    log = write(tmp_path / "cues.findings.txt", Device().records(drive()))
+    with pytest.raises(ConfigurationError, match="findings would overwrite the log"):
+        run(parsed(str(log), "--columns", *TEXTS, "--out", str(tmp_path / "cues.csv")))

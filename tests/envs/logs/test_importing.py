@@ -338,3 +338,71 @@ def test_a_short_log_is_refused(tmp_path: Path) -> None:
         import_log(write(tmp_path / "log.csv", table), COLUMNS)
     with pytest.raises(ConfigurationError):
         import_log(tmp_path / "log.csv", COLUMNS, units={"tme": "s"})
+
+
+def test_a_missing_horizontal_force_shows_no_yaw(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", Device().records(drive()))
+    for signal in ("force_x", "force_y"):
+        with pytest.raises(DataError, match=f"{signal} is constant .* give yaw_deg"):
+            import_log(path, {**WITH_COURSE, signal: "0"})
+    result = import_log(path, {**WITH_COURSE, "force_y": "0"}, options=ImportOptions(yaw_deg=0.0))
+    assert_recovered_along(result)
+
+
+def assert_recovered_along(result: ImportedLog) -> None:
+    wanted = at_100_hz(drive(), drive().force)
+    np.testing.assert_allclose(result.trace.specific_force[INSIDE, 0], wanted[INSIDE, 0], atol=0.06)
+
+
+def test_a_delay_at_the_end_of_its_range_is_noted(tmp_path: Path) -> None:
+    result = imported(tmp_path, Device(speed_delay=2.6), drive())
+    assert any("at the end of its range" in note for note in result.findings.device.notes)
+
+
+def test_a_receiver_of_its_own_rate_needs_no_bridge(tmp_path: Path) -> None:
+    truth = drive()
+    table = Device(yaw=1.0).records(truth)
+    between = np.arange(len(truth.time)) % 50 != 0
+    table["v"][between] = np.nan
+    table["course"][between] = np.nan
+    path = write(tmp_path / "log.csv", table)
+    assert_recovered(import_log(path, WITH_COURSE), truth, force=0.1, rate=0.01)
+    table["v"][900:1200] = np.nan
+    with pytest.raises(DataError, match=r"gap of .* s in speed at .*its usual step is 1 s"):
+        import_log(write(path, table), WITH_COURSE)
+    table["ay"][1000] = np.nan
+    with pytest.raises(DataError, match="force_y has an empty or NaN cell"):
+        import_log(write(path, table), WITH_COURSE)
+
+
+def test_only_repeated_columns_that_are_used_matter(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", Device().records(drive()))
+    header, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([header + ",x,x", *(row + ",1,2" for row in rows)]))
+    assert import_log(path, WITH_COURSE).trace.duration == pytest.approx(60.0)
+    with pytest.raises(DataError, match="column x occurs more than once"):
+        import_log(path, {**WITH_COURSE, "speed": "x"})
+    path.write_text("\n".join(["Logger 7", header, *rows]))
+    with pytest.raises(DataError, match="the first line, 'Logger 7', is no header of columns"):
+        import_log(path, WITH_COURSE)
+
+
+@pytest.mark.parametrize("rate_sign", [1, -1])
+def test_a_log_without_forces_takes_them_from_the_speed_by_choice(tmp_path: Path, rate_sign: int) -> None:
+    truth = drive()
+    device = Device(rate_sign=rate_sign, rate_bias=(0.0, 0.0, 0.02))
+    columns = {name: column for name, column in WITH_COURSE.items() if not name.startswith("force")}
+    path = write(tmp_path / "log.csv", device.records(truth))
+    with pytest.raises(ConfigurationError, match="no column for force_x"):
+        import_log(path, columns)
+    result = import_log(path, columns, options=ImportOptions(force="from-speed"))
+    assert "force not measured" in result.findings.changes[0].text
+    wanted = at_100_hz(truth, truth.force)[INSIDE]
+    wanted[:, 2] -= at_100_hz(truth, truth.speed[:, None] * truth.rate)[INSIDE, 1]
+    np.testing.assert_allclose(result.trace.specific_force[INSIDE], wanted, atol=0.1)
+    np.testing.assert_allclose(
+        result.trace.angular_velocity[INSIDE], at_100_hz(truth, truth.rate)[INSIDE], atol=4e-3
+    )
+    no_speed = {name: column for name, column in columns.items() if name != "speed"}
+    with pytest.raises(ConfigurationError, match="no column for speed"):
+        import_log(path, no_speed, options=ImportOptions(force="from-speed"))

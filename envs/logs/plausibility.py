@@ -1,0 +1,235 @@
+"""What no car does: gravity, scales and speeds that show a wrong unit, each refused with the likely one.
+
+A correlation knows no scale. Gravity gives the scale of the force, dv/dt that of the speed against it,
+v r that of the yaw rate, and the course that of the yaw rate once more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..cues import GRAVITY, Floats
+from ..errors import DataError
+from .mounting import Evidence, Mounting, correlation, detrended, rest_force, turn, weightless
+from .signals import RATES, UNITS, ImportOptions
+
+GRAVITY_TOLERANCE: Final = 0.5
+"""Gravity as a device measures it may differ by so much from 9.81 or from the one given, m/s^2."""
+
+SLOPE_TOLERANCE: Final = 1.5
+"""A slope outside of 1/1.5 to 1.5 shows a wrong unit; the smallest factor of one is 2.24 (mph)."""
+
+_SURE: Final = 0.7
+"""A slope is judged where its correlation is at least this."""
+
+_LEAST_VARIATION: Final = {"force": 0.25, "heading": 0.05}
+"""A slope is judged where the larger of both signals has this standard deviation, m/s^2, rad."""
+
+_WINDOW_S: Final = 8.0
+_TURNING: Final = 1.0
+_SILENT: Final = 0.35
+"""A channel may be dead in a window, s, where v r or f_y has this standard deviation, m/s^2, and the other
+less than this share of it."""
+
+_FASTEST: Final = {"speed": 120.0, **dict.fromkeys(RATES, 3.0)}
+"""What no car exceeds below 0.5 Hz: m/s, rad/s."""
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How steeply one signal follows another that it should equal.
+
+    Attributes:
+        correlation: Between the two.
+        least: Slope of the regression of the first on the second: too flat where the second is noisy.
+        most: The inverse regression's: too steep where the first has other causes.
+        judged: Whether both vary enough, and alike enough, to be judged.
+    """
+
+    correlation: float
+    least: float
+    most: float
+    judged: bool
+
+    @property
+    def likely(self) -> float:
+        """The geometric mean of both."""
+        return float(np.sign(self.least) * np.sqrt(self.least * self.most))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether no slope between both is near 1."""
+        return self.judged and (self.least > SLOPE_TOLERANCE or self.most < 1.0 / SLOPE_TOLERANCE)
+
+
+def slope(measured: Floats, expected: Floats, least_variation: float) -> Slope:
+    """Of ``measured`` (n,) on ``expected`` (n,)."""
+    found = correlation(measured, expected)
+    if found == 0.0:
+        return Slope(0.0, 0.0, 0.0, False)
+    ratio = float(measured.std() / expected.std())
+    judged = found >= _SURE and max(measured.std(), expected.std()) >= least_variation
+    return Slope(found, found * ratio, ratio / found, judged)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes of a log in the axes of the car; None where the log lacks a signal.
+
+    Attributes:
+        along: Of f_x on dv/dt.
+        across: Of f_y on v r.
+        heading: Of the integrated yaw rate on the course, both without their straight line.
+    """
+
+    along: Slope | None
+    across: Slope | None
+    heading: Slope | None
+
+    @classmethod
+    def of(cls, evidence: Evidence, mounting: Mounting) -> Slopes:
+        """The slopes of smoothed signals."""
+        force, rate = mounting.force_in_car(evidence.force), mounting.rate_in_car(evidence.rate)
+        along = across = heading = None
+        if evidence.speed is not None:
+            along = slope(force[:, 0], evidence.speed_rate, _LEAST_VARIATION["force"])
+            across = slope(force[:, 1], turn(evidence, rate[:, 2]), _LEAST_VARIATION["force"])
+        if evidence.course is not None:
+            turned = detrended(np.cumsum(rate[:, 2]) * evidence.dt)
+            heading = slope(turned, detrended(evidence.course), _LEAST_VARIATION["heading"])
+        return cls(along, across, heading)
+
+    def lines(self) -> list[str]:
+        """For people."""
+        names = {"f_x on dv/dt": self.along, "f_y on v r": self.across, "heading on course": self.heading}
+        return [
+            f"slope of {name:<18} {found.likely:.3f}"
+            for name, found in names.items()
+            if found is not None and found.judged
+        ]
+
+
+def silent_stretches(evidence: Evidence, mounting: Mounting) -> list[str]:
+    """Notes on the time in which one of f_y and v r varies as in a turn, and the other does not."""
+    if evidence.speed is None:
+        return []
+    measured = mounting.force_in_car(evidence.force)[:, 1]
+    expected = turn(evidence, mounting.rate_in_car(evidence.rate)[:, 2])
+    length = int(_WINDOW_S / evidence.dt)
+    found: dict[str, list[float]] = {}
+    for first in range(0, len(measured) - length + 1, length):
+        window = slice(first, first + length)
+        force, turning = float(measured[window].std()), float(expected[window].std())
+        if max(force, turning) >= _TURNING and min(force, turning) < _SILENT * max(force, turning):
+            which = ("v r varies, f_y does not", "f_y varies, v r does not")[force > turning]
+            found.setdefault(which, []).append(first * evidence.dt)
+    return [
+        f"{which}, from {times[0]:.0f} to {times[-1] + _WINDOW_S:.0f} s: a channel may be dead there"
+        for which, times in found.items()
+    ]
+
+
+def check_gravity(evidence: Evidence, options: ImportOptions) -> None:
+    """Refuse a force at rest whose length is not gravity.
+
+    Raises:
+        DataError: with the likely unit, or how gravity is added.
+    """
+    found, expected = float(np.linalg.norm(rest_force(evidence)[0])), options.gravity_m_s2 or GRAVITY
+    if abs(found - expected) <= GRAVITY_TOLERANCE:
+        return
+    said = f"gravity is {found:.3f} m/s^2 in the log, expected {expected:g}"
+    if found < GRAVITY_TOLERANCE or weightless(evidence.force):
+        raise DataError(
+            f"{said}: the force comes without gravity; set gravity='add', with roll_deg and pitch_deg if the "
+            "device is not level"
+        )
+    if options.gravity == "add":
+        raise DataError(f"{said}: the force comes with gravity; leave out gravity='add'")
+    likely = [
+        f"the force looks like {unit}: {how}"
+        for factor, unit, how in (
+            (9.80665, "g", "declare it (force_x=COLUMN:g, likewise y and z)"),
+            (1.0 / 9.80665, "m/s2", "declare it (force_x=COLUMN:m/s2, likewise y and z)"),
+            (9.80665e-3, "mg", "divide it by 1000 and declare g"),
+            (0.01, "cm/s2", "divide it by 100"),
+            (0.001, "mm/s2", "divide it by 1000"),
+            (0.3048, "ft/s2", "multiply it by 0.3048"),
+        )
+        if abs(found * factor - GRAVITY) <= 0.1 * GRAVITY
+    ]
+    raise DataError(
+        f"{said}; {likely[0]}"
+        if likely
+        else f"{said}; check units and columns of the force, or give gravity_m_s2 if the device counts so"
+    )
+
+
+def check_fastest(evidence: Evidence, units: Mapping[str, str]) -> None:
+    """Refuse rates and speeds that no car has, below 0.5 Hz.
+
+    Raises:
+        DataError: with the likely unit.
+    """
+    fastest = {name: np.abs(evidence.rate[:, axis]) for axis, name in enumerate(RATES)}
+    if evidence.speed is not None:
+        fastest["speed"] = np.abs(evidence.speed)
+    for name, values in fastest.items():
+        if values.max() > _FASTEST[name]:
+            known = UNITS[name]
+            unit = units.get(name, next(iter(known)))
+            others = " or ".join(f"{name}=COLUMN:{one}" for one in known if known[one] < known[unit])
+            remedy = f"its unit is not {unit}; declare {others}" if others else "check the column"
+            raise DataError(
+                f"{name} reaches {values.max():.4g} {next(iter(known))}, which no car does; {remedy}"
+            )
+
+
+def check_slopes(slopes: Slopes) -> None:
+    """Refuse slopes that show a wrong unit of speed, yaw rate or course.
+
+    Gravity has been checked before, so the force has its scale.
+
+    Raises:
+        DataError: names the signal at fault and the likely factor.
+    """
+    found = {
+        "f_x on dv/dt": slopes.along,
+        "f_y on v r": slopes.across,
+        "heading on course": slopes.heading,
+    }
+    wrong = {name: one for name, one in found.items() if one is not None and one.wrong}
+    if not wrong:
+        return
+    across, heading = (wrong.get(name) for name in ("f_y on v r", "heading on course"))
+    if "f_x on dv/dt" in wrong:
+        signal, factor = "speed", 1.0 / wrong["f_x on dv/dt"].likely
+    elif heading is not None and across is None:
+        signal, factor = "course", 1.0 / heading.likely
+    elif across is not None:
+        # Speed and yaw rate both scale v r. Where dv/dt is right, or does not vary, the rates are at fault.
+        signal, factor = "rates", 1.0 / across.likely
+        if slopes.heading is not None and heading is None and slopes.heading.judged:
+            signal = "speed"
+    shown = ", ".join(f"slope of {name} {one.likely:.3g}" for name, one in wrong.items())
+    raise DataError(
+        f"{shown}, expected 1: the {signal} {'are' if signal == 'rates' else 'is'} off by a factor of "
+        f"{factor:.3g}{_likely_factor(signal, factor)}; declare the unit, or set slopes='accept'"
+    )
+
+
+def _likely_factor(signal: str, factor: float) -> str:
+    hints = {
+        "speed": {3.6: "km/h (speed=COLUMN:km/h)", 2.237: "mph (speed=COLUMN:mph)", 1.944: "knots",
+                  9.80665: "x and y of the force in g (force_x=COLUMN:g)",
+                  1 / 3.6: "m/s (speed=COLUMN:m/s)", 0.447: "m/s (speed=COLUMN:m/s)",
+                  1.609: "mph declared as km/h", 1 / 1.609: "km/h declared as mph"},
+        "rates": {57.3: "deg/s (rate_z=COLUMN:deg/s)", 1 / 57.3: "rad/s (rate_z=COLUMN:rad/s)"},
+        "course": {57.3: "deg (course=COLUMN:deg)", 1 / 57.3: "rad (course=COLUMN:rad)"},
+    }[signal]  # fmt: skip
+    near = min(hints, key=lambda one: abs(np.log(one / factor)))
+    return f", which looks like {hints[near]}" if abs(np.log(near / factor)) < 0.25 else ""
