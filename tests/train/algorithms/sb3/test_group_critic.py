@@ -98,10 +98,8 @@ def test_the_critic_has_a_learning_rate_of_its_own():
 
 
 def test_a_training_makes_an_agent_of_the_actor():
-    config = load_config(
-        "ppo", None, task=TASK, n_envs=N, group=GROUP, steps=96,
-        hyperparameters={"policy": "GroupCriticPolicy", "n_steps": 8, "batch_size": 48, "annealed_std": [0.5, 0.1]},
-    )  # fmt: skip
+    own = {"policy": "GroupCriticPolicy", "n_steps": 8, "batch_size": 48, "annealed_std": [0.5, 0.1]}
+    config = load_config("ppo", task=TASK, n_envs=N, group=GROUP, steps=96, hyperparameters=own)
     learner = SB3Learner(config)
     learner.learn(lambda: None)
     network = learner.network()
