@@ -90,6 +90,10 @@ def _running_median(values: Floats, time: Floats) -> Floats:
     return np.asarray(median_filter(values, size=size, mode="mirror"))
 
 
+_COURSE_IS_KNOWN: Final = 2.0
+"""Speed below which receivers hold their last course, m/s."""
+
+
 def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]:
     """The log with empty cells where a sensor held one value, and what was changed.
 
@@ -99,7 +103,10 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
     frozen: dict[tuple[int, int], list[str]] = {}
     for name in (name for name in (*FORCES, *RATES, *RECEIVED) if name in log.signals):
         for hold in _frozen(log.time, log.signals[name]):
-            if _standing(log, hold, options):
+            slow = (
+                max(options.standstill_m_s, _COURSE_IS_KNOWN) if name == "course" else options.standstill_m_s
+            )
+            if _slower(log, hold, slow):
                 continue
             frozen.setdefault(hold, []).append(name)
     signals, changes = dict(log.signals), list[Change]()
@@ -119,10 +126,10 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
     return replace(log, signals=signals), changes
 
 
-def _standing(log: RawLog, hold: tuple[int, int], options: ImportOptions) -> bool:
-    """Whether the car hardly moves for most of a hold: then all signals may hold, a course for longer."""
-    speed = log.signals.get("speed", np.array([np.nan]))[hold[0] : hold[1] + 1]
-    return bool(np.any(np.isfinite(speed)) and np.nanmedian(speed) < options.standstill_m_s)
+def _slower(log: RawLog, hold: tuple[int, int], speed: float) -> bool:
+    """Whether the car is slower than ``speed`` for most of a hold: then what hardly changes may hold."""
+    found = log.signals.get("speed", np.array([np.nan]))[hold[0] : hold[1] + 1]
+    return bool(np.any(np.isfinite(found)) and np.nanmedian(found) < speed)
 
 
 def _frozen(time: Floats, values: Floats) -> list[tuple[int, int]]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import DataError
+from motion_cueing.envs.logs.channels import drop_frozen
 from motion_cueing.envs.logs.importer import ImportedLog, import_log
-from motion_cueing.envs.logs.signals import ImportOptions
+from motion_cueing.envs.logs.signals import ImportOptions, RawLog
 
 from .synthetic_log import COLUMNS, WITH_COURSE, Device, Floats, drive, write
 
@@ -149,3 +150,16 @@ def test_a_steep_beginning_is_no_outlier(tmp_path: Path) -> None:
     columns = {name: column[300:] for name, column in table().items()}
     columns["ax"] = columns["ax"] + np.clip(3.0 * (1.0 - np.arange(len(columns["t"])) / 10.0), 0.0, None)
     assert imported(tmp_path, columns).findings.changes == ()
+
+
+@pytest.mark.parametrize("speed", [1.5, 5.0])
+def test_a_receiver_holds_its_course_while_the_car_is_slow(speed: float) -> None:
+    """Receivers tell no course below some 2 m/s; one that holds it at 5 m/s froze."""
+    time = np.arange(500) * 0.02
+    course = np.where((time > 3.0) & (time < 7.0), 0.5, np.random.default_rng(0).normal(0.5, 0.3, 500))
+    log = RawLog(time, {"speed": np.full(500, speed), "course": course}, np.arange(500) + 1)
+    if speed > 2.0:
+        with pytest.raises(DataError, match="course held one value"):
+            drop_frozen(log, ImportOptions())
+    else:
+        assert drop_frozen(log, ImportOptions())[1] == []
