@@ -156,7 +156,8 @@ def test_a_steep_beginning_is_no_outlier(tmp_path: Path) -> None:
 def test_a_receiver_holds_its_course_while_the_car_is_slow(speed: float) -> None:
     """Receivers tell no course below some 2 m/s; one that holds it at 5 m/s froze."""
     time = np.arange(500) * 0.02
-    course = np.where((time > 3.0) & (time < 7.0), 0.5, np.random.default_rng(0).normal(0.5, 0.3, 500))
+    course = 0.1 * time + np.random.default_rng(0).normal(0.0, 1e-3, 500)
+    course[150:350] = course[150]
     log = RawLog(time, {"speed": np.full(500, speed), "course": course}, np.arange(500) + 1)
     if speed > 2.0:
         with pytest.raises(DataError, match="course held one value"):
