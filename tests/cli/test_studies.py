@@ -22,6 +22,7 @@ def cue_file(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_compare_writes_everything_and_goes_on(cue_file, tmp_path, capsys):
     out, machine = tmp_path / "out", tmp_path / "mine.yaml"
     save(replace(get_platform("dim-hexapod"), name="mine"), machine)

@@ -69,6 +69,7 @@ def test_an_agent_drives_what_it_was_made_for():
     assert np.isfinite(found.step_time).sum() == 100
 
 
+@pytest.mark.slow
 def test_the_command_evaluates_a_file(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     agent(name="called otherwise").save("mine.safetensors")

@@ -123,6 +123,7 @@ def spin(t):
     return np.column_stack([np.zeros_like(t), np.zeros_like(t), np.where((t > 1.0) & (t < 6.0), 0.8, 0.0)])
 
 
+@pytest.mark.slow
 def test_after_a_violent_drive_the_machine_comes_home():
     """No drift: with every preset, also where the paper's filters alone would leave it anywhere."""
     sets = [load_washout(name) for name in washout_presets()]

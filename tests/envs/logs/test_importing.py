@@ -45,6 +45,7 @@ def assert_recovered(result: ImportedLog, truth: Truth, force: float, rate: floa
     np.testing.assert_allclose(trace.angular_velocity[INSIDE], wanted[1][INSIDE], atol=rate)
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     roll=ANGLE,

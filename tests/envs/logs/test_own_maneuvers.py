@@ -16,6 +16,8 @@ from motion_cueing.envs.maneuvers.sampling import random_drives
 
 from .synthetic_log import COLUMNS, WITH_COURSE, Floats, rotation, write
 
+pytestmark = pytest.mark.slow
+
 LARGEST_J = 0.15
 """Of the error, in units of 0.6 m/s^2 and 3 deg/s."""
 

@@ -19,6 +19,7 @@ def batches():
     return {kind: random_drives(24, 60.0, seed=3, kind=kind) for kind in KINDS}
 
 
+@pytest.mark.slow
 def test_rows_of_a_batch_are_the_single_drives(batches):
     seeds = drive_seeds(24, 3)
     for row in (0, 7, 23):

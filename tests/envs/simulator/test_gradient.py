@@ -110,6 +110,7 @@ def unroll(platform: Platform) -> Unroll:
     return Unroll(simulator, STEPS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "platform", [get_platform("paper"), get_platform("nads-1"), lagging()], ids=["paper", "nads-1", "lag"]
 )

@@ -287,6 +287,7 @@ assert "| `height` | 1 | m | 2 | 2 | 10 | how deep the cab hangs |" in observati
 """
 
 
+@pytest.mark.slow
 def test_another_row_takes_one_page(tmp_path):
     """A row between others: declared and written on one page, and every other row stays right."""
     page = Path(layout_page.__file__).read_text(encoding="utf-8")

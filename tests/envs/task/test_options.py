@@ -73,6 +73,7 @@ def test_every_environment_has_a_native_batch():
         assert observation.shape == (2, *batch.single_observation_space.shape)
 
 
+@pytest.mark.slow
 def test_typical_scaling_shows_rows_of_about_unit_size():
     """Over what they usually are: fixed numbers, so the physical entries are known from them."""
     shown = DrivingSimulator("cueing-preview", episode={"library": 24})

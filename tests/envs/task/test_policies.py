@@ -69,6 +69,7 @@ def suite() -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return {name: scores(policy, drives) for name, policy in POLICIES.items()}
 
 
+@pytest.mark.slow
 def test_default_reward_ranks_policies_as_the_headline_metric_does(suite):
     for i, maneuver in enumerate(maneuver_names()):
         by_cost = sorted(suite, key=lambda name: suite[name][0][i])

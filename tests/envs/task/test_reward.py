@@ -134,6 +134,7 @@ assert info["failure"] == 1.0 and reward < -100.0 and info["stroke"] > 0.5
 """
 
 
+@pytest.mark.slow
 def test_another_term_takes_one_function_and_moves_no_weight(tmp_path):
     page = Path(reward_page.__file__).read_text(encoding="utf-8")
     before = "@term(weight=0.1)\n@wp.func\ndef stroke("

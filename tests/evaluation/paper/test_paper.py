@@ -90,6 +90,7 @@ def test_the_file_of_the_version_before_is_read():
     assert results.versions == old["versions"]
 
 
+@pytest.mark.slow
 def test_a_run_writes_table_figures_and_page(tmp_path, capsys):
     assert run(tmp_path) == 0
     said = capsys.readouterr().out

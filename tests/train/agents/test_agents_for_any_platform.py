@@ -78,6 +78,7 @@ def test_validation_drives_machines_that_are_not_trained_on(tmp_path):
     assert validation._batch.simulator.platform_of.tolist() == [0, 1, 2, 3]
 
 
+@pytest.mark.slow
 def test_it_learns_on_several_machines(tmp_path):
     task = {**TOLD, "episode": {"library": 2, "drive_duration": 6.0, "duration": 0.5, "random_start": True}}
     learner = ApgLearner(tiny.config(tmp_path, "apg", task=task, steps=4 * 10 * 4))
