@@ -67,17 +67,17 @@ def mend_spikes(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
         if not len(outliers):
             continue
         at = known[outliers[0]]
-        told = (
+        fault = (
             f"{name} is {values[outliers[0]]:.4g} {next(iter(UNITS[name]))} at data row {log.rows[at]} "
             f"({log.time[at]:.3f} s), among values near {median[outliers[0]]:.4g}"
         )
         if options.spikes == "refuse":
             raise DataError(
-                f"{told}: an outlier ({len(outliers)} in all); set spikes='median', or mend the log"
+                f"{fault}: an outlier ({len(outliers)} in all); set spikes='median', or mend the log"
             )
         signals[name] = signals[name].copy()
         signals[name][known[outliers]] = median[outliers]
-        text = f"{told}: replaced by the median of its neighbors ({len(outliers)} in all)"
+        text = f"{fault}: replaced by the median of its neighbors ({len(outliers)} in all)"
         changes.append(Change(text, tuple(log.time[known[outliers]].tolist())))
     return replace(log, signals=signals), changes
 
@@ -111,18 +111,18 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
             frozen.setdefault(hold, []).append(name)
     signals, changes = dict(log.signals), list[Change]()
     for (first, last), names in sorted(frozen.items()):
-        told = (
+        fault = (
             f"{', '.join(names)} held one value from {log.time[first]:.3f} to {log.time[last]:.3f} s "
             f"(data rows {log.rows[first]} to {log.rows[last]})"
         )
         if options.gaps == "refuse":
             raise DataError(
-                f"{told}: the sensor froze; set gaps='bridge', or leave it out with start_s or end_s"
+                f"{fault}: the sensor froze; set gaps='bridge', or leave it out with start_s or end_s"
             )
         for name in names:
             signals[name] = signals[name].copy()
             signals[name][first + 1 : last + 1] = np.nan
-        changes.append(Change(f"{told}: taken as a gap", (float(log.time[first]), float(log.time[last]))))
+        changes.append(Change(f"{fault}: taken as a gap", (float(log.time[first]), float(log.time[last]))))
     return replace(log, signals=signals), changes
 
 

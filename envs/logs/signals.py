@@ -448,7 +448,7 @@ class Grid:
     """An even time grid that is fine enough for the log's own rate.
 
     Attributes:
-        time: (m,) s from 0, at ``every`` times the rate asked for.
+        time: (m,) s from 0, at ``every`` times the given rate.
         start: Log time of the first point, s.
         every: One point in so many is a sample of the result.
     """

@@ -46,17 +46,17 @@ def in_order(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]
     if not len(back):
         return _even(log, known, options)
     row = log.rows[known[back[0]]]
-    told = f"time runs backwards at data row {row}, by {stamps[back[0] - 1] - stamps[back[0]]:.6g} s"
+    fault = f"time runs backwards at data row {row}, by {stamps[back[0] - 1] - stamps[back[0]]:.6g} s"
     forward = np.diff(stamps)[np.diff(stamps) > 0.0]
     seam = max(_SEAM_STEPS * float(np.median(forward)), options.longest_step_s) if len(forward) else 0.0
     if len(back) == 1 and 0.0 <= stamps[0] - stamps[-1] <= seam:
-        raise DataError(f"{told}: two segments are joined in the wrong order; put the later rows last")
+        raise DataError(f"{fault}: two segments are joined in the wrong order; put the later rows last")
     found = _wrap(stamps, back, log.first_stamp_s, seam)
     if found is None:
-        raise DataError(f"{told}; sort or split the log")
+        raise DataError(f"{fault}; sort or split the log")
     name, period = found
     if options.clock == "refuse":
-        raise DataError(f"{told}: its clock wraps after {name} ({period:.10g} s); set clock='mend'")
+        raise DataError(f"{fault}: its clock wraps after {name} ({period:.10g} s); set clock='mend'")
     time = log.time.copy()
     time[known] = stamps + period * _turns(len(stamps), back)
     rows = ", ".join(str(log.rows[known[place]]) for place in back[:5])
@@ -73,20 +73,20 @@ def _even(log: RawLog, known: NDArray[np.intp], options: ImportOptions) -> tuple
     usual = steps[(steps > 0.0) & (steps <= options.longest_step_s)]
     if not len(usual) or np.mean(usual < _BURST_STEP * usual.mean()) < _BURST_SHARE:
         return log, []
-    told = (
+    fault = (
         f"the time stamps come in bursts: their steps are {np.median(usual):.3g} s at the median, "
         f"{usual.mean():.3g} s in the mean"
     )
     if options.clock == "refuse":
         raise DataError(
-            f"{told}; set clock='mend' to space the rows evenly, or write the sensor's own stamps"
+            f"{fault}; set clock='mend' to space the rows evenly, or write the sensor's own stamps"
         )
     parts = np.split(np.arange(len(stamps)), np.flatnonzero(steps > options.longest_step_s) + 1)
     time = log.time.copy()
     for part in (part for part in parts if len(part) > 1):
         time[known[part]] = np.polyval(np.polyfit(part, stamps[part], 1), part)
     if np.any(np.diff(time[known]) <= 0.0):
-        raise DataError(f"{told}, and rows are missing between them; write the sensor's own stamps")
+        raise DataError(f"{fault}, and rows are missing between them; write the sensor's own stamps")
     time -= time[known[0]]
     return replace(log, time=time), [Change("rows evenly spaced: the time stamps came in bursts")]
 

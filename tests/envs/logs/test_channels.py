@@ -1,4 +1,4 @@
-"""Outliers, frozen sensors and dead speeds are told with row and time, and refused or mended by choice."""
+"""Outliers, frozen sensors and dead speeds are named with row and time, and refused or mended by choice."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -291,13 +292,19 @@ def test_rows_are_counted_from_the_top_of_the_file(tmp_path: Path) -> None:
         import_log(path, WITH_COURSE, options=ImportOptions(start_s=10.0))
 
 
-def test_sparse_speed_is_bridged(tmp_path: Path) -> None:
-    """A receiver that reports once a second leaves the other cells empty."""
+def with_a_slow_receiver() -> tuple[Any, dict[str, Any]]:
+    """A drive and its log, in which speed and course stand in one row of fifty."""
     truth = drive()
     table = Device(yaw=1.0).records(truth)
     between = np.arange(len(truth.time)) % 50 != 0
     table["v"][between] = np.nan
     table["course"][between] = np.nan
+    return truth, table
+
+
+def test_sparse_speed_is_bridged(tmp_path: Path) -> None:
+    """A receiver that reports once a second leaves the other cells empty."""
+    truth, table = with_a_slow_receiver()
     path = write(tmp_path / "log.csv", table)
     result = import_log(path, WITH_COURSE, options=ImportOptions(gaps="bridge"))
     assert_recovered(result, truth, force=0.1, rate=0.01)
@@ -361,11 +368,7 @@ def test_a_delay_at_the_end_of_its_range_is_noted(tmp_path: Path) -> None:
 
 
 def test_a_receiver_of_its_own_rate_needs_no_bridge(tmp_path: Path) -> None:
-    truth = drive()
-    table = Device(yaw=1.0).records(truth)
-    between = np.arange(len(truth.time)) % 50 != 0
-    table["v"][between] = np.nan
-    table["course"][between] = np.nan
+    truth, table = with_a_slow_receiver()
     path = write(tmp_path / "log.csv", table)
     assert_recovered(import_log(path, WITH_COURSE), truth, force=0.1, rate=0.01)
     table["v"][900:1200] = np.nan

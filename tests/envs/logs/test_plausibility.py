@@ -121,11 +121,11 @@ def test_a_yaw_rate_that_is_dead_for_a_while_is_noted(tmp_path: Path) -> None:
     table = Device().records(drive())
     whole = imported(tmp_path, table).findings.device.notes
     assert not any("may be dead" in note for note in whole)
-    for name, told in (("wz", "f_y varies, v r does not"), ("ay", "v r varies, f_y does not")):
+    for name, expected in (("wz", "f_y varies, v r does not"), ("ay", "v r varies, f_y does not")):
         first = int(np.argmax(np.diff(np.sign(table[name][1000:])) != 0)) + 1000
         dead = {**table, name: np.where(np.arange(len(table["t"])) < first, 0.0, table[name])}
         notes = imported(tmp_path, dead, COLUMNS, slopes="accept", yaw_deg=0.0).findings.device.notes
-        assert any(told in note for note in notes)
+        assert any(expected in note for note in notes)
 
 
 def test_a_force_that_does_not_follow_the_speed_is_noted(tmp_path: Path) -> None:

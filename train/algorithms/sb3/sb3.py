@@ -314,14 +314,14 @@ class SB3Learner(Learner):
         rates = [
             [one.rate, one.adapted_at] for one in self.callbacks if isinstance(one, AdaptiveLearningRate)
         ]
-        return {**whole, "monitor": self.monitor.state(), "told": self._logged(), "rates": rates}
+        return {**whole, "monitor": self.monitor.state(), "logged": self._logged(), "rates": rates}
 
     def restore(self, state: State) -> None:
         """Go on from a state."""
         restore(state, self.model, self.simulators, self.normalize)
         self._resumed = {name: state[name] for name in ("random", "noise", "walks")}
         self.monitor.restore(state["monitor"])
-        self.model.logger.name_to_value.update(state["told"])
+        self.model.logger.name_to_value.update(state.get("logged", state.get("told", {})))
         adaptive = [one for one in self.callbacks if isinstance(one, AdaptiveLearningRate)]
         for callback, saved in zip(adaptive, state.get("rates", []), strict=True):
             callback.rate, callback.adapted_at = saved
