@@ -61,6 +61,10 @@ SMALL = {
 """What makes the training of a tutorial a matter of seconds."""
 FEWER = {'group=8, episode={"library": 128})': 'group=8, episode={"library": 2})'}
 """The same of the guide to other libraries."""
+GROUPS = {
+    '128, "cueing-preview", group=8, stagger=True': f'8, "cueing-preview", {_FEW}, group=8, stagger=True'
+}
+"""The same of the guide to reinforcement learning."""
 
 
 def generate():
@@ -105,7 +109,7 @@ def folder(tmp_path, monkeypatch):
                          ids=lambda page: page.relative_to(ROOT).as_posix())  # fmt: skip
 def test_python_runs(page, folder):
     def smaller(code: str) -> str:
-        for large, small in (SMALL | FEWER).items():
+        for large, small in (SMALL | FEWER | GROUPS).items():
             code = code.replace(large, small)
         return code
 
@@ -119,6 +123,8 @@ def test_small_trainings_are_in_the_pages():
     assert [large for large in SMALL if large not in text] == []
     text = text_of(DOCS / "guides" / "other-libraries.md")
     assert [large for large in FEWER if large not in text] == []
+    text = text_of(DOCS / "guides" / "reinforcement-learning.md")
+    assert [large for large in GROUPS if large not in text] == []
 
 
 def test_the_first_example_scores_better_than_standing_still_and_the_second_keeps_an_agent(folder, capsys):
