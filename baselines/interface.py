@@ -73,6 +73,20 @@ class Observer:
         return np.array(self._out.numpy())
 
 
+@dataclass(frozen=True)
+class Live:
+    """A simulator whose drive may be written while it goes on.
+
+    Args:
+        simulator: With the drive's samples.
+        memories: Low-passed cues of each sample, with the time constants of the low-passes, s, for each
+            observation that holds some: the policy's, and that of the base policy under it.
+    """
+
+    simulator: Simulator
+    memories: tuple[tuple[Mirror, tuple[float, ...]], ...] = ()
+
+
 class Interface(ABC):
     """Machines as one kind of policy sees and moves them.
 
@@ -83,7 +97,7 @@ class Interface(ABC):
         requested: (n, 9) accelerations commanded to the axes in the last time step, m/s^2 and rad/s^2.
         slices: Where the rows of an observation are, by name.
         simulator_cue_measured: Whether its rows of simulator cues are sensors' readings, not a model's.
-        cue_memory: Low-passed cues of each sample that observations hold, and their time constants, s.
+        live: What the cues of a drive are written into, sample by sample, where they come one by one.
     """
 
     simulator: Simulator
@@ -92,7 +106,7 @@ class Interface(ABC):
     requested: Floats
     slices: Mapping[str, slice] = SLICES
     simulator_cue_measured: bool = True
-    cue_memory: tuple[Mirror | None, tuple[float, ...]] = (None, ())
+    live: tuple[Live, ...]
 
     @abstractmethod
     def begin(self, start: ArrayLike | None) -> None:
@@ -129,6 +143,7 @@ class MachineInterface(Interface):
             vestibular=machines.vestibular,
             dt=machines.time_step,
         )
+        self.live = (Live(self.simulator),)
         self._observe = Observer(self.simulator)
         self.requested = np.zeros((self.simulator.n, N_AXES))
 
@@ -185,7 +200,9 @@ class TaskInterface(Interface):
         self.steps_per_action = task.action.repeat
         self.slices = self.batch.layout.slices
         self.simulator_cue_measured = task.observation.simulator_cue == "machine"
-        self.cue_memory = (self.batch.arrays.memory, task.observation.memory)
+        beside = self.batch.beside
+        self._batches = (self.batch,) if beside is None else (self.batch, beside)
+        self.live = tuple(Live(one.simulator, one.memories) for one in self._batches)
         self._machine_of = np.zeros(n, dtype=np.int32)
         if machines.platform_of is not None:
             self._machine_of[...] = machines.platform_of
@@ -200,10 +217,11 @@ class TaskInterface(Interface):
         n, where = self.batch.n, self.simulator.snapshot() if start is None else None
         everywhere = np.ones(n, dtype=bool)
         self.batch.begin(everywhere, np.arange(n, dtype=np.int32), self._machine_of)
-        if where is None:
-            self.simulator.reset(start)
-        else:
-            self.simulator.restore(where)
+        for one in self._batches:
+            if where is None:
+                one.simulator.reset(start)
+            else:
+                one.simulator.restore(where)
         self.batch.observe(everywhere)
 
     def observe(self) -> Array:

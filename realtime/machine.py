@@ -9,9 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..baselines.interface import Machines
+from ..baselines.interface import Live, Machines
 from ..baselines.policy import Policy, as_policy
-from ..envs.arrays import Mirror
 from ..envs.cues import GRAVITY, CueTrace
 from ..envs.errors import ActionError, ConfigurationError
 from ..envs.perception import VestibularModel, get_vestibular_model
@@ -48,23 +47,21 @@ class LiveCues:
     A policy that looks ahead sees the newest cues that far ahead.
 
     Args:
-        simulator: With one environment on the CPU and the drive of :func:`standing`.
-        memory: Where an environment keeps low-passed cues of each row.
-        time_constants: Of the low-passes, s.
+        live: With one environment on the CPU and the drive of :func:`standing`.
     """
 
-    def __init__(
-        self, simulator: Simulator, memory: Mirror | None = None, time_constants: Sequence[float] = ()
-    ) -> None:
-        drives = simulator.constants[2]
-        self._simulator = simulator
+    def __init__(self, live: Live) -> None:
+        drives = live.simulator.constants[2]
+        self._simulator = live.simulator
         self._rows = [drives.force.numpy(), drives.rate.numpy(), drives.rate_derivative.numpy()]
         # Views that are made once: each step of a millisecond counts.
         self._moves = [(rows[:-1], rows[1:], rows[-1]) for rows in self._rows]
-        self._samples = [states.numpy()["sample"] for states, _ in simulator.copies]
-        self._memory = memory.view if memory is not None and time_constants else None
-        self._poles = np.exp(-TIME_STEP / np.array(time_constants, dtype=np.float64))[:, None]
-        self._past: Floats = np.tile(self._scaled(), (len(time_constants), 1))
+        self._samples = [states.numpy()["sample"] for states, _ in live.simulator.copies]
+        self._low_passes = [
+            _LowPasses(memory.view, constants, self._scaled())
+            for memory, constants in live.memories
+            if constants
+        ]
 
     @property
     def reference_cue(self) -> Floats:
@@ -79,22 +76,43 @@ class LiveCues:
             last[...] = newest
         # The kernels count samples; here the sample they step to is always the same row.
         self._samples[self._simulator.current][...] = NOW - 1
-        if self._memory is not None:
-            self._past = self._poles * self._past + (1.0 - self._poles) * self._scaled()
-            self._remember()
+        scaled = self._scaled()
+        for one in self._low_passes:
+            one.put(scaled)
 
     def begin(self) -> None:
         """Take the car to have moved for ever as it moves now, as at the beginning of any drive."""
-        self._past[...] = self._scaled()
-        self._remember()
+        for one in self._low_passes:
+            one.begin(self._scaled())
 
     def _scaled(self) -> Floats:
         """(6,) cues of the car now, as an observation scales them."""
         return np.asarray((self.reference_cue - AT_REST) / _SCALE)
 
-    def _remember(self) -> None:
-        if self._memory is not None:
-            self._memory[NOW] = self._past.ravel()
+
+class _LowPasses:
+    """The low-passed cues of the present sample, in the row that observations read.
+
+    Args:
+        memory: (samples, 6 per time constant) that observations read.
+        time_constants: Of the low-passes, s.
+        cues: (6,) as they were for ever.
+    """
+
+    def __init__(self, memory: NDArray[Any], time_constants: Sequence[float], cues: Floats) -> None:
+        self._row = memory[NOW]
+        self._poles = np.exp(-TIME_STEP / np.array(time_constants, dtype=np.float64))[:, None]
+        self._past: Floats = np.tile(cues, (len(time_constants), 1))
+
+    def begin(self, cues: Floats) -> None:
+        """Cues (6,) were as now for ever."""
+        self._past[...] = cues
+        self._row[...] = self._past.ravel()
+
+    def put(self, cues: Floats) -> None:
+        """Move on by a time step, with cues (6,)."""
+        self._past = self._poles * self._past + (1.0 - self._poles) * cues
+        self._row[...] = self._past.ravel()
 
 
 AXES_AND_LEGS: Final = 15
@@ -196,7 +214,7 @@ class LiveMachine:
         )
         self.now, self.ahead = self._now.simulator, self._ahead.simulator
         self._follow = self._ahead.follow(self._now)
-        self._cues = LiveCues(self.now, *self._now.cue_memory)
+        self._cues = [LiveCues(one) for one in self._now.live]
         self._view = MotionView(self.ahead)
         self.start = np.asarray(policy.start_pose, dtype=np.float64)
         self.reset()
@@ -211,7 +229,8 @@ class LiveMachine:
 
     def begin(self) -> None:
         """The policy begins anew, from where the machine is."""
-        self._cues.begin()
+        for cues in self._cues:
+            cues.begin()
         self._now.begin(None)
         self._actor = Actor(self._policy, 1, self._now.action_size)
         self._let_go()
@@ -219,7 +238,7 @@ class LiveMachine:
     @property
     def reference_cue(self) -> Floats:
         """(6,) cues of the car now: specific force, m/s^2, and angular velocity, rad/s."""
-        return self._cues.reference_cue
+        return self._cues[0].reference_cue
 
     def catch_up(self, cues: Floats) -> None:
         """Take the machine to where it was a step ahead, with the car's cues (6,) there.
@@ -227,9 +246,11 @@ class LiveMachine:
         Raises:
             Exception: any error of the policy's own code; the machine is there all the same.
         """
-        self._cues.put(cues)
+        for live_cues in self._cues:
+            live_cues.put(cues)
         if self._last is None:
-            self.now.reset(self.start, sample=NOW)
+            for one in self._now.live:
+                one.simulator.reset(self.start, sample=NOW)
             return
         try:
             if self._actions is None:

@@ -21,6 +21,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Mirror
 from ..cues import CueTrace
 from ..errors import ConfigurationError
 from ..platform.machines import Platform
@@ -87,11 +88,13 @@ class Base:
         policy: The policy, or None.
         every: Time steps from one action of the policy to the next; 0 for never.
         before: Whether it acts before each time step, with the agent's action, instead of after it.
+        memories: Low-passed cues that its own observation holds, and their time constants, s.
     """
 
     policy: Any = None
     every: int = 0
     before: bool = False
+    memories: tuple[tuple[Mirror, tuple[float, ...]], ...] = ()
 
     def begin(self, mask: Mask) -> None:
         """Episodes begin in the masked environments."""
@@ -220,6 +223,7 @@ class TaskBase(_Remembering):
         layout = layout_of(task.observation, task.action.mode, task.action.size)
         memory = low_passed(drives, task.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, simulator.device)
+        self.memories = ((self.arrays.memory, task.observation.memory),)
         self.arrays.episode, self.arrays.begins = shared.episode, shared.begins
         rules = rules_of(task, layout, simulator.platforms, TIME_STEP, simulator.device)
         self._launches = Launches(simulator, self.arrays, rules)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Mirror
 from ..cues import CueTrace
 from ..errors import ActionError, ConfigurationError, UnknownNameError
 from ..perception.models import get_vestibular_model
@@ -34,7 +35,7 @@ from .episode import (
     uniform,
 )
 from .kernels.action import action_scale
-from .kernels.observation import layout_of, low_passed
+from .kernels.observation import COMPARED, layout_of, low_passed
 from .options import TaskOptions
 
 Array = NDArray[Any]
@@ -53,6 +54,12 @@ class Batch:
         base: The base policy of the modes "residual" and "gains": a policy, its name or its file; default:
             what ``options.action.base`` names.
         device: "cpu" or a CUDA device of Warp.
+
+    Attributes:
+        beside: The base policy by itself in the same episodes, where reward or observation are against it.
+
+    Raises:
+        ConfigurationError: they are, and there is no base policy; or observations are stacked.
     """
 
     def __init__(
@@ -95,7 +102,12 @@ class Batch:
         self._keys, self._episodes = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.int64)
         self.rules = rules_of(options, self.layout, platforms, TIME_STEP, self.simulator.device)
         self._launches = Launches(self.simulator, self.arrays, self.rules)
-        self._alone = self._base_alone(policy)
+        self.beside = self._base_alone(policy)
+
+    @property
+    def memories(self) -> tuple[tuple[Mirror, tuple[float, ...]], ...]:
+        """Low-passed cues that observations hold, the base policy's included, and their time constants, s."""
+        return ((self.arrays.memory, self.options.observation.memory), *self.base.memories)
 
     def _library(self, drives: Sequence[CueTrace] | None) -> list[CueTrace]:
         if drives is None:
@@ -113,17 +125,21 @@ class Batch:
         return TaskBase(policy, self.options, self.simulator, self.drives, self.arrays)
 
     def _base_alone(self, policy: Any) -> Batch | None:
-        """The base policy by itself in the same episodes, where the reward is against it."""
-        reward = self.options.reward
-        if not reward.against_base:
+        """The base policy by itself in the same episodes; its actions stay zero."""
+        reward, seen = self.options.reward, self.options.observation
+        if not reward.against_base and not seen.against_base:
             return None
         if policy is None:
-            raise ConfigurationError(
-                "reward.against_base needs a base policy: action.mode 'residual' or 'gains'"
-            )
+            raise ConfigurationError("against_base needs a base policy: action.mode 'residual' or 'gains'")
+        if seen.against_base and seen.stack > 1:
+            raise ConfigurationError("observation.stack must be 1 with observation.against_base")
         return Batch(
             self.n,
-            replace(self.options, reward=replace(reward, against_base=False)),
+            replace(
+                self.options,
+                reward=replace(reward, against_base=False),
+                observation=replace(seen, against_base=False),
+            ),
             drives=self.drives,
             platforms=self.simulator.platforms,
             base=policy,
@@ -135,8 +151,8 @@ class Batch:
         chosen = np.flatnonzero(mask)
         self._keys[chosen] = [key_of(seeds[i]) for i in chosen.tolist()]
         self._episodes[chosen] = 0
-        if self._alone is not None:
-            self._alone.seed(mask, seeds)
+        if self.beside is not None:
+            self.beside.seed(mask, seeds)
 
     @property
     def scale(self) -> Floats:
@@ -176,8 +192,8 @@ class Batch:
             sample=first,
             start=start_poses(words, self._pose_scales[machine_of], options.episode.platform_offset),
         )
-        if self._alone is not None:
-            self._alone.begin(mask, drive, machine)
+        if self.beside is not None:
+            self.beside.begin(mask, drive, machine)
 
     def _place(self, mask: Mask, **drawn: NDArray[Any]) -> None:
         """Put the masked environments where was drawn for them."""
@@ -213,19 +229,35 @@ class Batch:
         # A base policy acts anew within an action, too; the last observation shows what it does next.
         within = CORE if base.every == 1 else NOTHING
         last = within if base.every and not base.before else ALL
+        beside = None if self.beside is None else self.beside.play()
         for k in range(repeat):
             if base.before:
                 self._act(gains)
             self._launches.play(k, within if k < repeat - 1 else last)
             if base.every and not base.before and (k + 1) % base.every == 0:
                 self._act()
+            if beside is not None:
+                next(beside)
             yield k
         if last != ALL:
             self._launches.look(False, ALL if within == NOTHING else FRAME)
-        if self._alone is not None:
-            self._alone.step()
-            self.arrays.reward.pull()[...] -= self._alone.arrays.reward.pull()
-            self.arrays.reward.push()
+        if beside is not None and self.beside is not None:
+            next(beside, None)
+            self._compare(self.beside)
+            if self.options.reward.against_base:
+                self.arrays.reward.pull()[...] -= self.beside.arrays.reward.pull()
+                self.arrays.reward.push()
+
+    def _compare(self, beside: Batch) -> None:
+        """Write how the machines differ from those ``beside``, which the base policy drives alone."""
+        if not self.options.observation.against_base:
+            return
+        where, seen = self.layout.slices["against_base"], self.arrays.observation
+        own, theirs = seen.pull(), beside.arrays.observation.pull()
+        bound = self.layout.bounds[where]
+        change = (own[:, COMPARED] - theirs[:, COMPARED]) * self.layout.gains[where]
+        np.clip(change, -bound, bound, out=own[:, where])
+        seen.push()
 
     def observe(self, begins: Mask) -> None:
         """Make the observations of the environments new whose episode ``begins`` (n,)."""
@@ -235,8 +267,9 @@ class Batch:
             self._act(mask=begins)
         self._launches.look(True, FRAME)
         self._mark(np.zeros(self.n, dtype=bool))
-        if self._alone is not None:
-            self._alone.observe(begins)
+        if self.beside is not None:
+            self.beside.observe(begins)
+            self._compare(self.beside)
 
     def _act(self, gains: NDArray[np.float32] | None = None, mask: Mask | None = None) -> None:
         """Let the base policy act."""
@@ -248,8 +281,8 @@ class Batch:
         arrays = {name: bytes_of(mirror.array) for name, mirror in self.arrays.changing()}
         machines = {f"simulator.{name}": data for name, data in self.simulator.snapshot().items()}
         draws_made = {"keys": self._keys.copy(), "episodes": self._episodes.copy()}
-        alone = {} if self._alone is None else self._alone.snapshot()
-        prefixed = {f"alone.{name}": data for name, data in alone.items()}
+        beside = {} if self.beside is None else self.beside.snapshot()
+        prefixed = {f"alone.{name}": data for name, data in beside.items()}
         return {**arrays, **machines, **draws_made, **self.base.snapshot(), **prefixed}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
@@ -264,8 +297,8 @@ class Batch:
         self.simulator.restore(_under("simulator.", snapshot))
         self._keys[...], self._episodes[...] = snapshot["keys"], snapshot["episodes"]
         self.base.restore(snapshot)
-        if self._alone is not None:
-            self._alone.restore(_under("alone.", snapshot))
+        if self.beside is not None:
+            self.beside.restore(_under("alone.", snapshot))
 
     @property
     def commanded(self) -> NDArray[np.float64]:

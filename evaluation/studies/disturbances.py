@@ -85,7 +85,7 @@ class _NoisyInterface(Interface):
 
     def __init__(self, inner: Interface, noise: SensorNoise) -> None:
         self._inner, self._noise = inner, noise
-        self.simulator, self.action_size = inner.simulator, inner.action_size
+        self.simulator, self.live, self.action_size = inner.simulator, inner.live, inner.action_size
         self.steps_per_action, self.slices = inner.steps_per_action, inner.slices
         self._draw = np.random.default_rng(noise.seed)
 

@@ -16,6 +16,7 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import legs_of_pose
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.envs.task.kernels.observation import layout_of
+from motion_cueing.envs.task.options import load_task
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.realtime import Cues, State, make_machine
@@ -100,6 +101,16 @@ def test_a_policy_of_an_environment(options):
 def test_a_policy_on_a_washout(mode, base, size, repeat):
     size = len(ScheduledWashout().gain_names) if mode == "gains" else size
     policy = Feedback(TaskOptions(action=ActionOptions(mode=mode, repeat=repeat)), base(), size)
+    bench = Bench(policy)
+    assert_same_motion(bench, bench.drive(TRACE), rollout(policy, TRACE))
+
+
+@pytest.mark.parametrize("against", [False, True])
+@pytest.mark.parametrize("base", ["linear-washout", "classical"])
+def test_a_policy_of_the_cueing_task(base, against):
+    seen, reward = {"against_base": against}, {"against_base": False}
+    task = load_task("cueing", action={"base": base}, observation=seen, reward=reward)
+    policy = Feedback(task, make_policy(base, PAPER), size=4)
     bench = Bench(policy)
     assert_same_motion(bench, bench.drive(TRACE), rollout(policy, TRACE))
 

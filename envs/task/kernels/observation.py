@@ -29,6 +29,7 @@ from ...simulator.kernels.observation import (
     FIRST,
     ROWS,
     SCALES,
+    SLICES,
     TYPICAL,
     Row,
     share_of_limit,
@@ -77,6 +78,7 @@ class ObservationOptions:
     machine: bool = False
     simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
     scaling: Scaling = "physical"
+    against_base: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,9 @@ MACHINE: Final = (
 
 _TYPICAL_CUE: Final = (0.15, 0.12, 0.03, 0.03, 0.02, 0.09)
 """Of `reference_force`, in its scale, and `reference_rate`."""
+
+COMPARED: Final = slice(SLICES["simulator_force"].start, SLICES["beta_rate"].stop)
+"""Entries of which the row ``against_base`` is the difference."""
 
 ADDED: Final = (
     *_added(
@@ -259,6 +264,19 @@ ADDED: Final = (
         lambda seen, mode, action: seen.machine,
         *MACHINE,
         Row("travel_used", 3, 1.0, "1", "carriage x, y and turntable over the end ahead of them"),
+    ),
+    *_added(
+        lambda seen, mode, action: seen.against_base,
+        Row(
+            "against_base",
+            COMPARED.stop - COMPARED.start,
+            1.0,
+            "as theirs",
+            "`observation.against_base`: the rows from simulator_force to beta_rate, less those of a machine "
+            "that the base policy drives alone",
+            # Differences are smaller than what is usual on the road.
+            typical=(0.25,),
+        ),
     ),
 )
 """The rows after :data:`~motion_cueing.envs.simulator.kernels.observation.ROWS`, in order."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from motion_cueing.envs.task import (
     ActionOptions,
     DrivingSimulator,
     DrivingSimulatorVector,
+    ObservationOptions,
     RewardOptions,
     RewardWeights,
 )
+from motion_cueing.envs.task.options import load_task
 from motion_cueing.train.agents import get_agent
 
 from .tasks import SHORT
@@ -153,6 +156,41 @@ def test_a_reward_against_the_base_is_the_difference_of_two_machines():
         assert (reward == 0.0) == (k <= 2)
 
 
+@pytest.mark.parametrize("scaling", ["physical", "typical"])
+def test_an_observation_against_the_base_is_the_difference_of_two_machines(scaling):
+    seen = ObservationOptions(scaling=scaling, frame="cab", simulator_cue="model")
+    options: dict[str, Any] = {"action": replace(RESIDUAL, base="linear-washout"), "episode": SHORT}
+    env = DrivingSimulator(**options, observation=replace(seen, against_base=True))
+    own, base = (DrivingSimulator(**options, observation=seen) for _ in range(2))
+    first, *_ = (one.reset(seed=1)[0] for one in (env, own, base))
+    assert not first[-22:].any()
+    rng = np.random.default_rng(0)
+    for k in range(10):
+        action = rng.uniform(-1.0, 1.0, 2).astype(np.float32) * (k > 2)
+        whole, mine, theirs = env.step(action)[0], own.step(action)[0], base.step(ZERO)[0]
+        assert np.array_equal(whole[:-22], mine)
+        # The rows from the simulator's force to the rates of its angles, in 0.25 of what they usually are.
+        difference = (mine - theirs)[6:28] * (4.0 if scaling == "typical" else 1.0)
+        assert np.allclose(whole[-22:], np.clip(difference, -10.0, 10.0), rtol=1e-6)
+        assert whole[-22:].any() == (k > 2)
+
+
+def test_a_batch_shows_against_the_base_what_each_environment_does():
+    task = load_task("cueing", episode={"library": 2}, observation={"against_base": True})
+    several = DrivingSimulatorVector(3, task)
+    single = [DrivingSimulator(task, drives=several.batch.drives) for _ in range(3)]
+    rng = np.random.default_rng(1)
+    seen = several.reset(seed=[4, 5, 6])[0]
+    # The washout multiplies matrices of float32, for all environments at once or for one.
+    close = partial(np.testing.assert_allclose, rtol=1e-4, atol=1e-4)
+    close(seen, [env.reset(seed=4 + i)[0] for i, env in enumerate(single)])
+    for _ in range(4):
+        actions = rng.uniform(-1.0, 1.0, (3, 4)).astype(np.float32)
+        seen = several.step(actions)[0]
+        close(seen, [env.step(a)[0] for env, a in zip(single, actions, strict=True)])
+        assert seen[:, -22:].any()
+
+
 def test_rewards_are_divided_by_what_standing_still_costs_and_have_a_floor():
     weights = RewardWeights(cue_error=1.0, stroke=0.0, tilt_rate=0.0, limits=0.0, action_rate=0.0)
     plain = DrivingSimulator(episode=SHORT, reward=RewardOptions(weights=weights))
@@ -194,6 +232,11 @@ def test_rewards_are_divided_by_what_standing_still_costs_and_have_a_floor():
         ),
         ({"action": {"base": "classical"}}, "base 'classical' is of no use with mode 'acceleration'"),
         ({"reward": {"against_base": True}}, "needs a base policy"),
+        ({"observation": {"against_base": True}}, "needs a base policy"),
+        (
+            {"action": RESIDUAL, "base": "classical", "observation": {"against_base": True, "stack": 2}},
+            "stack must be 1",
+        ),
         ({"reward": {"floor": 0.0}}, "reward.floor"),
     ],
 )
