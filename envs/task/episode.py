@@ -131,8 +131,9 @@ def fill_episodes(
 
 
 def cost_scales(drives: Sequence[CueTrace], options: RewardOptions) -> Floats:
-    """(n,) what rewards are divided by on each drive: 1 + ``standstill`` times J of standing still."""
-    return np.array([1.0 + options.standstill * standstill_cost(drive, options.zone) for drive in drives])
+    """(n,) what rewards are divided by on each drive: 1 + ``standstill`` times J of standing still, a scale."""
+    standing = np.array([standstill_cost(drive, options.zone) for drive in drives])
+    return np.asarray((1.0 + options.standstill * standing) / options.scale)
 
 
 def standstill_cost(drive: CueTrace, cost: CueCost) -> float:

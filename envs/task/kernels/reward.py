@@ -233,6 +233,8 @@ class RewardOptions:
             acceleration, so that what lies beyond a short horizon costs now; None: where it is.
         standstill: Rewards are divided by 1 + this share of J of standing still on the drive, so that each
             drive counts by how well it can be done, and not by how fierce it is; 0: they are not divided.
+        scale: Factor on rewards, after that division: learners such as SAC weigh them against the entropy of
+            their actions, and begin with a weight of 1 for it.
         against_base: Whether the reward of the base policy alone, on a second machine in the same drive, is
             taken off: 0 for an agent that does nothing, above for one that is better. The drive's own ups
             and downs, which no action changes, are gone then; it takes twice the simulation.
@@ -248,6 +250,7 @@ class RewardOptions:
     stroke_margin: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.8
     stroke_braking: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     standstill: NonNegative = 0.0
+    scale: Positive = 1.0
     against_base: bool = False
     floor: Positive | None = None
 

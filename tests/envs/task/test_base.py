@@ -197,7 +197,8 @@ def test_rewards_are_divided_by_what_standing_still_costs_and_have_a_floor():
     shared = RewardOptions(weights=weights, standstill=0.5)
     divided = DrivingSimulator(episode=SHORT, reward=shared)
     floored = DrivingSimulator(episode=SHORT, reward=replace(shared, floor=0.01))
-    for one in (plain, divided, floored):
+    scaled = DrivingSimulator(episode=SHORT, reward=replace(shared, scale=3.0))
+    for one in (plain, divided, floored, scaled):
         one.reset(seed=4)
     drive = plain.batch.drives[plain.batch.simulator.drive_of[0]]
     force = (drive.specific_force + np.array([0.0, 0.0, 9.81])) / 0.6
@@ -208,6 +209,7 @@ def test_rewards_are_divided_by_what_standing_still_costs_and_have_a_floor():
         action = rng.uniform(-0.01, 0.01, 9)
         reward = plain.step(action)[1]
         assert divided.step(action)[1] == pytest.approx(reward / (1.0 + 0.5 * standing), rel=1e-3)
+        assert scaled.step(action)[1] == pytest.approx(3.0 * reward / (1.0 + 0.5 * standing), rel=1e-3)
         assert floored.step(action)[1] == pytest.approx(max(reward / (1.0 + 0.5 * standing), -0.01), rel=1e-3)
 
 
