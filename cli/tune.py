@@ -36,8 +36,8 @@ _SUCCESS: Final = 0
 _INTERRUPTED: Final = 130
 _MADE_BY: Final = "Made by: "
 """What a file of this command begins with."""
-_TRACK: Final = "random track drive"
-"""Source of a random drive on a handling track."""
+_SPARED: Final = tuple(f"random {kind} drive" for kind in ("track", "circuit", "limit"))
+"""Sources of random drives in which limits may be met."""
 _HELD: Final = ("objective", "method", "limits", "maneuvers", "drives", "seed")
 """Options that a search keeps to its end."""
 _ELSE: Final = "leave it out, name another --out, or add --fresh to begin anew"
@@ -60,7 +60,7 @@ class TuneCommand:
     maneuvers: Names = ("train",)
     """Maneuvers and recordings, by name or cue CSV file; `train` for random drives."""
     limits: Literal["roads", "all"] = "roads"
-    """Where no limit of the machine may be met: on roads, or also in random drives on a track."""
+    """Where no limit of the machine may be met: on roads, or also on tracks, circuits and sliding tires."""
     drives: Whole | None = None
     """Random drives, each of a minute; default: 256."""
     hours: float | None = None
@@ -220,8 +220,8 @@ def _search(record: Record, command: TuneCommand, goes_on: bool) -> Search:
 
 def _spared(options: TuningOptions, drives: list[CueTrace]) -> list[int]:
     """The random drives in which limits may be met."""
-    on_track = [i for i, drive in enumerate(drives) if drive.source == _TRACK]
-    return on_track if options.limits == "roads" else []
+    spared = [i for i, drive in enumerate(drives) if drive.source in _SPARED]
+    return spared if options.limits == "roads" else []
 
 
 def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:

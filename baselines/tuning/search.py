@@ -16,7 +16,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from ...envs.errors import ConfigurationError, DataError
-from ...envs.maneuvers import RandomDrives, drive_seeds
+from ...envs.maneuvers import drive_seeds
+from ...envs.maneuvers.sampling import NamedDrives, load_drives
 from ...envs.provenance import package_version
 from ...envs.settings import Positive, configuration, from_dict, renamed, to_dict
 from ...envs.storage import write_text
@@ -31,8 +32,8 @@ HELD_OUT_SEED: Final = 1_000_000
 HELD_OUT: Final = 64
 """Their number."""
 
-ROADS: Final = RandomDrives(urban=0.3, rural=0.2, highway=0.1, track=0.4)
-"""Roads that the shipped agents are trained on; many are tracks, as the standard maneuvers are hard, too."""
+ROADS: Final = load_drives("broad")
+"""Random drives as cars drive: those that agents are trained on."""
 
 Count = Annotated[int, Field(ge=0, lt=2**32)]
 
@@ -46,11 +47,12 @@ class TuningOptions:
         objective: J, or perceived J.
         method: "cma", or "gradient" through the machine's own equations, for a classical washout.
         maneuvers: "train" for random drives, or names of maneuvers and recordings.
-        limits: Drives in which no limit may be met: "all", or "roads", which exempts the random drives on a
-            track. A set that takes the hardest of those without a limit is a timid one on every road.
+        limits: Drives in which no limit may be met: "all", or "roads", which exempts the random drives on
+            tracks and circuits and those at the limit of the tires. A set that takes the hardest of those
+            without a limit is a timid one on every road.
         drives: Number of random drives, if any.
         duration: Length of each, s.
-        roads: Distribution of the random drives.
+        roads: Distribution of the random drives, or its name.
         drives_seed: Seed of the random drives; the default is that of the agents' training.
         budget: Time to simulate, h.
         seed: Seed of every other draw.
@@ -63,7 +65,7 @@ class TuningOptions:
     limits: Literal["roads", "all"] = "roads"
     drives: Annotated[int, Field(ge=1)] = 256
     duration: Positive = 60.0
-    roads: RandomDrives = ROADS
+    roads: NamedDrives = ROADS
     drives_seed: Count = 0
     budget: Positive = 1000.0
     seed: Count = 0
