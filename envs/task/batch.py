@@ -254,8 +254,8 @@ class Batch:
             return
         where, seen = self.layout.slices["against_base"], self.arrays.observation
         own, theirs = seen.pull(), beside.arrays.observation.pull()
-        bound = self.layout.bounds[where]
-        change = (own[:, COMPARED] - theirs[:, COMPARED]) * self.layout.gains[where]
+        bound, gains = self.layout.bounds[where], self.layout.gains
+        change = (own[:, COMPARED] - theirs[:, COMPARED]) * (gains[where] / gains[COMPARED])
         np.clip(change, -bound, bound, out=own[:, where])
         seen.push()
 

@@ -133,6 +133,14 @@ _TYPICAL_CUE: Final = (0.15, 0.12, 0.03, 0.03, 0.02, 0.09)
 COMPARED: Final = slice(SLICES["simulator_force"].start, SLICES["beta_rate"].stop)
 """Entries of which the row ``against_base`` is the difference."""
 
+_TYPICAL_DIFFERENCE: Final = tuple(
+    # Differences are about a quarter of what is usual on the road.
+    0.25 * usual / row.scale
+    for row in ROWS
+    if COMPARED.start <= SLICES[row.name].start < COMPARED.stop
+    for usual in row.typical or (row.scale,) * row.size
+)
+
 ADDED: Final = (
     *_added(
         lambda seen, mode, action: 1,
@@ -274,8 +282,7 @@ ADDED: Final = (
             "as theirs",
             "`observation.against_base`: the rows from simulator_force to beta_rate, less those of a machine "
             "that the base policy drives alone",
-            # Differences are smaller than what is usual on the road.
-            typical=(0.25,),
+            typical=_TYPICAL_DIFFERENCE,
         ),
     ),
 )

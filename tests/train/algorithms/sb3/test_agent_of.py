@@ -43,7 +43,7 @@ def test_an_environment_has_a_file_and_the_raw_one_all_defaults(tmp_path):
     path = tmp_path / "task.yaml"
     path.write_text(f"preset: {NAME}\nepisode: {{duration: 7.0}}\n")
     assert agent_of(learned("ppo"), path, "mine").task.episode.duration == 7.0
-    with pytest.raises(DataError, match="its network has 155 entries of observation, its task"):
+    with pytest.raises(DataError, match="its network has 177 entries of observation, its task"):
         agent_of(learned("ppo"), ENVIRONMENT_ID, "mine")
 
 

@@ -19,7 +19,11 @@ from motion_cueing.train.algorithms.sb3.sb3 import SB3Learner
 from motion_cueing.train.config import load_config
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
-TASK = load_task("cueing-preview", episode={"library": 2, "drive_duration": 12.0, "duration": 2.0})
+TASK = load_task(
+    "cueing-preview",
+    episode={"library": 2, "drive_duration": 12.0, "duration": 2.0},
+    observation={"against_base": False},
+)
 GROUP, N, SIZE = 3, 6, 155
 
 
