@@ -3,8 +3,7 @@
     python -m benchmarks.learning --out results/learning.json
     python -m benchmarks.learning --algorithms ppo --minutes 2 --task cueing
 
-Each training is ``MlpPolicy`` with the default hyperparameters of its class, on 16 environments in groups of
-8. J is that of the deterministic policy on random drives that are never trained on, at the start and about
+Each training is ``MlpPolicy`` with the default hyperparameters of its class, on 16 environments. J is that of the deterministic policy on random drives that are never trained on, at the start and about
 every minute of processor time. A training that is in the file already is not repeated.
 """
 
@@ -28,7 +27,6 @@ from motion_cueing.train.validation import Validation
 from motion_cueing.train.vec_env import DrivingSimulatorVecEnv
 
 ENVIRONMENTS: Final = 16
-GROUP: Final = 8
 DRIVES: Final = ValidationOptions(drives=24)
 
 
@@ -93,7 +91,7 @@ def _config(algorithm: str, task: str, seed: int) -> TrainingConfig:
 def train(algorithm: str, task: str, seed: int, minutes: float, every: float) -> list[dict[str, float]]:
     """Train with defaults; returns the curve of its validations."""
     config = _config(algorithm, task, seed)
-    envs = DrivingSimulatorVecEnv(ENVIRONMENTS, config.task, group=GROUP, stagger=True)
+    envs = DrivingSimulatorVecEnv(ENVIRONMENTS, config.task, stagger=True)
     maker: Any = CLASSES[algorithm]
     model = maker("MlpPolicy", envs, seed=seed, device="cpu")
     validator = Validator(Validation(config), minutes, every)
