@@ -54,7 +54,7 @@ class AxisSignals:
 
     @property
     def scaled(self) -> Mask:
-        """(n,) samples with neither: a cue of the right sign and of any size, or nothing noticeable."""
+        """(n,) samples with neither: a cue of the right sign and of any size, or none to be noticed."""
         return np.asarray(~(self.false | self.missing))
 
     @cached_property
@@ -128,7 +128,8 @@ class AxisMetrics:
     cue_error_scaled: float | None = metric(
         lambda a: float(np.mean(a.error * a.scaled)),
         "The part of `cue_error` that arises in all other samples, divided by all samples: a cue of the "
-        "right sign with the wrong size, or at the wrong time. The three parts sum to `cue_error`.",
+        "right sign with the wrong size or at the wrong time, or too small a one to be noticed. "
+        "The three parts sum to `cue_error`.",
         source=CLEIJ, default=None,
     )  # fmt: skip
     perceived_rmse: float = metric(

@@ -45,6 +45,7 @@ DEGREES_PER_SECOND: Final = Display("deg/s", degrees)
 MICROSECONDS: Final = Display("µs", microseconds)
 ACCELERATION: Final = Display("m/s²", number)
 SECONDS: Final = Display("s", seconds)
+TIME: Final = Display("s", number)
 JERK: Final = Display("m/s³", number)
 OF_AXIS: Final = Display("", number)
 """In m/s^2 on an axis of force, in deg/s on one of rotation."""

@@ -23,7 +23,7 @@ from .declaration import (
     JERK,
     MICROSECONDS,
     PERCENT,
-    SECONDS,
+    TIME,
     Metric,
     declared,
     documented,
@@ -291,7 +291,7 @@ class Metrics:
     worst_second_time: float | None = metric(
         lambda d: d.worst_second[1],
         "Time from the start of the drive to the begin of that second.",
-        "s", "worst second at", SECONDS, undefined, better="", tables=("feel",), default=None,
+        "s", "worst second at", TIME, undefined, better="", tables=("feel",), default=None,
     )  # fmt: skip
     incongruence_max: float | None = metric(
         lambda d: float(d.incongruence.max()),
@@ -311,7 +311,8 @@ class Metrics:
     cue_error_scaled: float | None = metric(
         lambda d: sum(axis.cue_error_scaled for axis in d.axis_metrics.values()),
         "The part of J that arises in samples with neither a false nor a missing cue on the axis: a cue of "
-        "the right sign with the wrong size, or at the wrong time. The three parts sum to J.",
+        "the right sign with the wrong size or at the wrong time, or too small a one to be noticed. The "
+        "three parts sum to J.",
         header="J of scaled cues", source=CLEIJ, tables=("feel",), default=None,
     )  # fmt: skip
     cue_error_missing: float | None = metric(

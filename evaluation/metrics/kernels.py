@@ -39,7 +39,7 @@ def repeat_drives(
 
     Args:
         model: Coefficients.
-        force: (k, n) specific force at the head, head frame, z up, m/s^2.
+        force: (k, n) specific force at the head, in its own axes, m/s^2.
         rate: (k, n) angular velocity of the head, rad/s.
         length: (k,) samples of each drive.
         vertical: (k,) specific force at rest in the attitude in which each drive begins.

@@ -22,8 +22,6 @@ from .kernels import Model, repeat_drives
 
 TIME_STEP: Final = 0.01
 """Euler step of the model, s. Drives of another step are interpolated."""
-_UP: Final = np.array([1.0, -1.0, -1.0])
-"""From this project's axes (x forward, y right, z down) to the model's (x forward, y left, z up)."""
 
 
 @configuration
@@ -59,7 +57,10 @@ class ConflictModel:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HeadMotion:
-    """The motion of a head, in this project's axes (z down).
+    """The motion of a head.
+
+    The model is the same in any right-handed frame: in this project's (z down) as in that of its authors
+    (z up).
 
     Args:
         force: (n, 3) specific force, m/s^2.
@@ -86,7 +87,7 @@ def sickness_incidence(
         exposure: How long each is repeated, s.
         model: Parameters.
     """
-    drives = [(_model_axes(one.force, dt), _model_axes(one.rate, dt)) for one in motions]
+    drives = [(_at_time_step(one.force, dt), _at_time_step(one.rate, dt)) for one in motions]
     lengths = np.array([len(force) for force, _ in drives], dtype=np.int32)
     rows = np.zeros((2, len(drives), int(lengths.max()), 3), dtype=FLOAT)
     for k, pair in enumerate(drives):
@@ -94,7 +95,7 @@ def sickness_incidence(
     values = Model()
     for name, value in dataclasses.asdict(model or ConflictModel()).items():
         setattr(values, name, value)
-    vertical = np.array([one.vertical for one in motions]) * _UP
+    vertical = np.array([one.vertical for one in motions], dtype=FLOAT)
     incidence = wp.zeros(len(drives), dtype=real, device="cpu")
     wp.launch(
         repeat_drives,
@@ -104,7 +105,7 @@ def sickness_incidence(
             wp.array(rows[0], dtype=vec3, device="cpu"),
             wp.array(rows[1], dtype=vec3, device="cpu"),
             wp.array(lengths, dtype=int, device="cpu"),
-            wp.array(vertical.astype(FLOAT), dtype=vec3, device="cpu"),
+            wp.array(vertical, dtype=vec3, device="cpu"),
             round(exposure / TIME_STEP),
             TIME_STEP,
         ],
@@ -114,9 +115,8 @@ def sickness_incidence(
     return np.asarray(incidence.numpy(), dtype=np.float64)
 
 
-def _model_axes(values: Floats, dt: float) -> Floats:
-    """(n, 3) values in the model's axes and at its time step."""
-    values = values * _UP
+def _at_time_step(values: Floats, dt: float) -> Floats:
+    """(n, 3) values at the time step of the model."""
     if abs(dt / TIME_STEP - 1.0) <= 1e-6:
         return values
     time = dt * np.arange(len(values))
