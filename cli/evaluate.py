@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ..envs.errors import ConfigurationError
 from ..envs.progress import drives_progress
@@ -37,6 +37,9 @@ class EvaluateCommand:
     """Drives to score as they were driven, and their cues to drive: logs of `motion-cueing serve`."""
     platform: PlatformName = "paper"
     car: CarName = "sedan"
+    metrics: Annotated[tuple[Literal["feel"], ...], several("feel")] = ()
+    """Tables beside the usual ones. `feel`: what people feel, and whether it agrees with J. It measures the
+    incidence of motion sickness, too, and writes feel.md."""
     out: OutFolder = Path("results")
 
 
@@ -76,6 +79,7 @@ class Plan:
         out: Folder of the output.
         arguments: The command line.
         skipped: Policies of the benchmark that cannot be driven here, and why; what is left out of a replay.
+        feel: Whether the tables of what people feel are shown and written.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -85,6 +89,7 @@ class Plan:
     out: Path
     arguments: tuple[str, ...]
     skipped: Mapping[str, str] = field(default_factory=dict)
+    feel: bool = False
 
 
 @dataclass(eq=False)
@@ -142,13 +147,15 @@ def report(plan: Plan, ranked: bool) -> int:
         ranked: Whether the table of the benchmark is printed as well.
     """
     from ..evaluation.benchmark import benchmark_table
-    from ..evaluation.reporting.tables import print_results
-    from ..evaluation.reporting.text import print_table, table_console
+    from ..evaluation.reporting.tables import feel_tables, print_results
+    from ..evaluation.reporting.text import print_table, save_markdown, table_console
 
     results, figures = evaluate(plan)
     save(results, figures, plan.out)
+    if plan.feel:
+        save_markdown(plan.out / "feel.md", *feel_tables(results))
     console = table_console()
-    print_results(console, results)
+    print_results(console, results, plan.feel)
     if ranked and results.scores:
         print_table(console, benchmark_table(results))
     console.print(
@@ -185,6 +192,7 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         out=command.out,
         arguments=tuple(words),
         skipped=skipped,
+        feel="feel" in command.metrics,
     )
 
 
@@ -201,7 +209,7 @@ def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
 
     output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies))
     with drives_progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
-        outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance)
+        outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance, costly=plan.feel)
     return collect(plan, outcome), output.figures
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from .comparison import common_drives
-from .metrics import CUE_AXES, mean, over_drives
+from .metrics import CUE_AXES, METRICS, mean, over_drives
 from .reporting.tables import policy_table
 from .reporting.text import TextTable, how_many, save_markdown
 from .results import Results, save_frame
@@ -77,7 +77,8 @@ def benchmark(results: Results) -> pd.DataFrame:
                 **over_drives(drives),
             }
         )
-    return pd.DataFrame(rows)
+    # A metric that no drive has is a column of NaN.
+    return pd.DataFrame(rows).astype({name: float for name in METRICS if rows})
 
 
 def benchmark_table(results: Results) -> TextTable:

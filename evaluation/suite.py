@@ -59,6 +59,7 @@ def run_suite(
     finish: Finish,
     progress: OnDrive = lambda maneuver, policy: None,
     criteria: Criteria | None = None,
+    costly: bool = False,
 ) -> Outcome:
     """Drive every maneuver with every policy and measure it.
 
@@ -70,6 +71,7 @@ def run_suite(
         finish: Called after each maneuver that at least one policy finished.
         progress: Called before the cues are made and before each drive.
         criteria: Thresholds of the metrics.
+        costly: Whether costly metrics are measured, too.
     """
     outcome = Outcome()
     for maneuver, source in maneuvers.items():
@@ -87,7 +89,7 @@ def run_suite(
             # numbers; a drive beyond all bounds has none.
             try:
                 driven = replace(drive(cues), maneuver=maneuver, policy=name)
-                measured[name] = measure(driven, criteria)
+                measured[name] = measure(driven, criteria, costly)
             except Exception as error:
                 outcome.failures.append(Failure(maneuver, name, explain(error)))
                 continue

@@ -25,6 +25,8 @@ from ..metrics import METRICS, ActuatorMetrics, AxisMetrics, Criteria, Metrics, 
 from ..results import Results
 from .tables import (
     axis_table,
+    feel_table,
+    feel_tables,
     machine_table,
     maneuver_table,
     matrix_table,
@@ -57,6 +59,7 @@ def render(results: Results, figures: Mapping[str, bytes], benchmark: bytes | No
         suite=suite_table(results),
         benchmark=benchmark_table(results),
         benchmark_image=_embedded(benchmark),
+        feel=feel_tables(results),
         matrix=matrix_table(results),
         scores=score_table(results),
         heat=_heat(results),
@@ -82,6 +85,7 @@ def _part(results: Results, maneuver: str, figure: bytes | None) -> dict[str, An
         "name": maneuver,
         "headline": maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)),
         "verdict": next(verdict for verdict in results.verdicts if verdict.maneuver == maneuver),
+        "feel": feel_table(maneuver, drives),
         "axes": axis_table(maneuver, drives),
         "machine": machine_table(maneuver, drives),
         "notes": notes_table(maneuver, results.notes.get(maneuver, {})),
@@ -100,7 +104,7 @@ def _heat(results: Results) -> list[list[float | None]]:
     return shades
 
 
-_BETTER: Final = {"lower": "Lower is better.", "higher": "Higher is better.", "": ""}
+_BETTER: Final = {"lower": "Lower is better.", "higher": "Higher is better.", "one": "1 is the car.", "": ""}
 
 
 def definitions() -> dict[str, str]:

@@ -8,11 +8,33 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.console import Console
 from rich.markup import escape
 
-from ..comparison import NormalizedScore
-from ..metrics import CUE_AXES, METRICS, OF_AXIS, ActuatorMetrics, AxisMetrics, Metrics, Table, declared
+from ..agreement import LEAST_POLICIES, agreement
+from ..comparison import NormalizedScore, common_drives
+from ..metrics import (
+    CUE_AXES,
+    METRICS,
+    OF_AXIS,
+    ActuatorMetrics,
+    AxisMetrics,
+    Metrics,
+    Table,
+    declared,
+    over_drives,
+)
 from ..results import Results
 from ..suite import print_troubles
-from .text import NOTHING, TextTable, degrees, fraction, is_missing, number, percent, print_note, print_table
+from .text import (
+    NOTHING,
+    TextTable,
+    degrees,
+    fraction,
+    how_many,
+    is_missing,
+    number,
+    percent,
+    print_note,
+    print_table,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,6 +163,52 @@ def notes_table(maneuver: str, notes: Mapping[str, Mapping[str, str]]) -> TextTa
     return TextTable(f"{maneuver}: counts of the policies", ("policy", "of", "counted"), tuple(rows))
 
 
+def feel_table(maneuver: str, drives: Mapping[str, Metrics]) -> TextTable:
+    """What people feel of each policy on one maneuver, best J first."""
+    rows = {policy: {name: getattr(m, name) for name in METRICS} for policy, m in drives.items()}
+    return _feel_table(f"{maneuver}: what people feel", rows)
+
+
+def _feel_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> TextTable:
+    import pandas as pd
+
+    order = sorted(rows, key=lambda policy: rows[policy]["cue_error"])
+    frame = pd.DataFrame([{"policy": policy, **rows[policy]} for policy in order], dtype=object)
+    return policy_table(title, frame, "feel")
+
+
+def feel_tables(results: Results) -> list[TextTable]:
+    """What people feel over the drives that every policy finished, and whether it agrees with J.
+
+    The second is missing where there are too few policies for an order.
+    """
+    common = common_drives(results.maneuvers)
+    if not common:
+        return []
+    policies = list(next(iter(common.values())))
+    rows = {policy: over_drives([drives[policy] for drives in common.values()]) for policy in policies}
+    table = _feel_table(f"What people feel, over {how_many(len(common), 'drive')}", rows)
+    return [table, *([agreement_table(results)] if len(policies) >= LEAST_POLICIES else [])]
+
+
+def agreement_table(results: Results) -> TextTable:
+    """Rank correlations of each metric of what people feel with J about the order of the policies."""
+    rows = []
+    for row in agreement(results.maneuvers).to_dict("records"):
+        name = METRICS[row["metric"]].header
+        rows.append(
+            (
+                name if row["reading"] == "value" else f"{name}, {row['reading']}",
+                *(fraction(row[column]) for column in ("spearman", "kendall", "lowest")),
+                row["lowest_on"] if row["drives"] else NOTHING,
+                fraction(row["spearman_overall"]),
+                str(row["drives"]),
+            )
+        )
+    header = ("order by", "Spearman", "Kendall", "lowest", "on", "Spearman over all drives", "drives")
+    return TextTable("Agreement with J about the order of the policies", header, tuple(rows))
+
+
 def matrix_table(results: Results) -> TextTable:
     """J by maneuver and policy."""
     return _by_maneuver("J by maneuver", results, "cue_error", number)
@@ -190,12 +258,22 @@ def suite_table(results: Results) -> TextTable:
     return TextTable(_all_of(results), header, tuple(rows), (0,))
 
 
-def print_results(console: Console, results: Results) -> None:
-    """Show a table a maneuver, the suite, the verdicts, wrong solves, skipped policies and failures."""
+def print_results(console: Console, results: Results, feel: bool = False) -> None:
+    """Show a table a maneuver, the suite, the verdicts, wrong solves, skipped policies and failures.
+
+    Args:
+        console: Where.
+        results: What.
+        feel: Whether what people feel is shown, too.
+    """
     for maneuver, drives in results.maneuvers.items():
         print_table(console, maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)))
+        if feel:
+            print_table(console, feel_table(maneuver, drives))
     if results.scores:
         print_table(console, suite_table(results))
+    for table in feel_tables(results) if feel else []:
+        print_table(console, table)
     for verdict in results.verdicts:
         everywhere = verdict.maneuver == "all"
         name = f"Over {_all_of(results).lower()}" if everywhere else verdict.maneuver

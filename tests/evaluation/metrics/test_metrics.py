@@ -29,7 +29,7 @@ from motion_cueing.evaluation.metrics import (
     over_drives,
 )
 
-from .synthetic import GRAVITY, drive, trajectory
+from ..synthetic import GRAVITY, drive, trajectory
 
 REST = np.array([0.0, 0.0, -GRAVITY])
 
