@@ -136,11 +136,6 @@ def _restarted(rows: Rows, at: int) -> list[Sent]:
     return sent
 
 
-def _braking() -> Rows:
-    """Three seconds of another drive."""
-    return cues_of(get_maneuver("braking").drive())[0][9 * RATE : 12 * RATE]
-
-
 SECOND: Final = RATE
 FAULTS: Final[dict[str, Fault]] = {
     "none": lambda c, at, r: _stream(c),
@@ -158,7 +153,7 @@ FAULTS: Final[dict[str, Fault]] = {
     "flag, moved 2 s on": lambda c, at, r: _paused(c, at, 5.0, 2 * SECOND),
     "reset to standing": lambda c, at, r: _stream(_changed(c, at, np.tile(AT_REST, (len(c) - at, 1)))),
     "teleport to 2 s later": lambda c, at, r: _stream(_inserted(c, at, c[:0], 2 * SECOND)),
-    "teleport into braking": lambda c, at, r: _stream(_inserted(c, at, _braking())),
+    "teleport to 2 s before": lambda c, at, r: _stream(_inserted(c, at, c[at - 2 * SECOND :], len(c))),
     "force frozen for 3 s": lambda c, at, r: _stream(_changed(c, at, np.hstack([np.tile(c[at - 1, :3], (3 * SECOND, 1)), c[at : at + 3 * SECOND, 3:]]))),
     "a third are copies": lambda c, at, r: _copies(c, r.random(len(c)) < 1 / 3),
     "packets repeated": lambda c, at, r: [s for s in _stream(c) for _ in range(2)],

@@ -18,6 +18,8 @@ slope, so that nothing steps. Cues without a fault pass as they are, to the bit.
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from typing import Final
 
 import numpy as np
@@ -36,6 +38,12 @@ _SETTLED: Final = 5.83
 """Product of frequency and time after which a critically damped spring is within 2 % of its rest."""
 _BLEND: Final = 5.0
 """Blend after a gap, in lengths of the gap: the slope then is at most 1.5 times that of the cues."""
+_TREND: Final = 6
+"""Time steps over which a trend is measured: a rough road must not tip it."""
+_LEAD: Final = 3
+"""Most time steps for which cues are led on by their trend."""
+_MISSING: Final = 1.05
+"""A sender that is faster than the time steps, with this tolerance, has a packet for each."""
 _DONE: Final = np.repeat([1e-4, 1e-5], 3)
 """Distance, m/s^2 and rad/s, and rate of change a second, at which a blend ends: nobody feels it."""
 
@@ -69,8 +77,8 @@ class GuardOptions:
     stuck: Positive = 0.5
     settle: NonNegative = 0.3
     fade: Positive = 1.0
-    jerk: Positive = 10.0
-    angular_acceleration: Positive = 1.0
+    jerk: Positive = 30.0
+    angular_acceleration: Positive = 3.0
 
 
 class Blend:
@@ -90,22 +98,20 @@ class Blend:
         self._frequency = np.inf
         self.over = True
 
-    def start(self, distance: Floats, seconds: float) -> None:
-        """Blend from a distance on, within about ``seconds``; one that still goes on is never sped up."""
-        self._distance = distance
+    def start(self, distance: Floats, rate: Floats, seconds: float) -> None:
+        """Blend from a distance and its rate on, within about ``seconds``; a slower one keeps its pace."""
+        self._distance, self._rate = distance, np.clip(rate, -self._slope, self._slope)
         self._frequency = min(self._frequency, _SETTLED / seconds)
         self.over = False
 
     def step(self) -> Floats:
         """(6,) distance a time step later."""
-        w, dt = self._frequency, TIME_STEP
+        w, dt, bound = self._frequency, TIME_STEP, self._slope
         # Both roots of the spring are at -w: this is its exact step.
-        lead = self._rate + w * self._distance
-        decay = np.exp(-w * dt)
+        lead, decay = self._rate + w * self._distance, np.exp(-w * dt)
         moved = decay * (self._distance + lead * dt)
-        bound = self._slope * dt
-        moved = self._distance + np.clip(moved - self._distance, -bound, bound)
-        self._rate = np.clip(decay * (self._rate - w * lead * dt), -self._slope, self._slope)
+        moved = self._distance + np.clip(moved - self._distance, -bound * dt, bound * dt)
+        self._rate = np.clip(decay * (self._rate - w * lead * dt), -bound, bound)
         self._distance = moved
         if (np.abs(moved) < _DONE).all() and (np.abs(self._rate) < _DONE).all():
             self.stop()
@@ -137,19 +143,21 @@ class Guard:
         self._last: Cues | None = None
         self._accepted = 0
         self._raw = self._good = AT_REST
+        self._interval = math.inf
         self._since_good = self._calm = 0.0
         self._frozen = np.zeros(2)
-        self._suspects = 0
-        self._paused = self._stepped = self._copied = False
+        self._suspects = self._waited = 0
+        self._paused = self._copied = False
+        self._trend = np.zeros(6)
+        self._heard: deque[Floats] = deque([], _TREND)
         self.follows = True
         self.begin()
 
     def begin(self) -> None:
         """The policy begins: nothing was given before."""
         self._blend.stop()
-        self._given = AT_REST
+        self._given: deque[Floats] = deque([], _TREND)
         self._gap = 0.0
-        self._stepped = False
 
     def __call__(self, cues: Cues, paused: bool, accepted: int) -> Floats:
         """(6,) cues for the policy: force, m/s^2, angular velocity, rad/s.
@@ -159,76 +167,89 @@ class Guard:
             paused: Whether the sender has said since that its drive is paused.
             accepted: Packets that were whole, new and in time so far.
         """
-        followed = self.follows
+        followed, self._gap = self.follows, 0.0
         if paused:
-            self._distrust("pauses", already=self._paused)
+            self._distrust("pauses", again=self._paused)
         self._paused = paused
+        self._waited += 1
         if self._last is None or cues.sequence != self._last.sequence:
             self._take(cues, accepted)
-        target = self._good if self.follows else AT_REST
-        if followed != self.follows or self._stepped:
-            quick = self._stepped and followed and self.follows
-            seconds = min(_BLEND * self._gap, self._options.fade) if quick else self._options.fade
-            self._blend.start(self._given - target, seconds)
-            self._stepped = False
-        self._given = target if self._blend.over else target + self._blend.step()
-        return self._given
+        target = self._expected() if self.follows else AT_REST
+        if self._given and (followed != self.follows or self._gap > 0.0):
+            self._turn(target, rejoins=not followed)
+        given = target if self._blend.over else target + self._blend.step()
+        self._heard.append(target if self.follows else self._raw)
+        self._given.append(given)
+        return given
 
-    def _distrust(self, kind: str, already: bool) -> None:
-        self.counts[kind] += not already
-        self.follows, self._calm, self._suspects = False, 0.0, 0
+    def _expected(self) -> Floats:
+        """The cues now: the newest that were believed, led on by their trend where one is known to be missing."""
+        missing = self._suspects or self._copied or (self._waited and self._interval < _MISSING * TIME_STEP)
+        if not missing or not self._waited:
+            return self._good
+        lead = TIME_STEP * min(self._waited, _LEAD)
+        return np.asarray(self._good + lead * self._trend)
+
+    def _turn(self, target: Floats, rejoins: bool) -> None:
+        """Begin a blend from what was given to a target, with the slopes of both."""
+        slope = _trend(self._given)
+        ahead = np.zeros(6) if not self.follows else _trend(self._heard) if rejoins else slope
+        fade = self._options.fade
+        seconds = min(_BLEND * self._gap, fade) if self._gap > 0.0 and not rejoins else fade
+        self._blend.start(self._given[-1] - (target - ahead * TIME_STEP), slope - ahead, seconds)
+
+    def _distrust(self, kind: str, again: bool = False) -> None:
+        self.counts[kind] += not again
+        self.follows, self._calm, self._suspects, self._copied = False, 0.0, 0, False
 
     def _take(self, cues: Cues, accepted: int) -> None:
         """Judge a packet that has come since the last time step."""
-        raw, last = np.array(cues.force + cues.rate), self._last
-        elapsed = TIME_STEP if last is None else max(cues.time - last.time, TIME_STEP)
+        raw, last, before = np.array(cues.force + cues.rate), self._last, self._raw
         lost = last is not None and cues.sequence - last.sequence > accepted - self._accepted
-        self._last, self._accepted = cues, accepted
-        before, self._raw = self._raw, raw
+        self._last, self._accepted, self._raw = cues, accepted, raw
         if last is None:
-            self._good = raw
+            self._accept(raw)
             return
-        copy = bool((raw == before).all() and (raw != AT_REST).any())
-        self._freeze(before, raw, elapsed)
+        elapsed = max(cues.time - last.time, TIME_STEP)
+        self._interval = (cues.time - last.time) / max(cues.sequence - last.sequence, 1)
         self._since_good += elapsed
+        same, rest = ((raw == other).reshape(2, 3).all(axis=1) for other in (before, AT_REST))
+        self._frozen = np.where(same & ~rest, self._frozen + elapsed, 0.0)
+        stuck = bool((self._frozen >= self._options.stuck).any())
         if not self.follows:
-            calm = self._near(raw, before, elapsed) and not self._is_stuck
+            calm = not stuck and self._near(raw, before, elapsed)
             self._calm = self._calm + elapsed if calm else 0.0
             if self._calm >= self._options.settle:
                 self.follows = True
                 self._accept(raw)
-        elif self._is_stuck:
-            self._distrust("stuck", already=False)
-        elif copy and not self._suspects:
+        elif stuck:
+            self._distrust("stuck")
+        elif same.all() and not rest.all() and not self._suspects:
             self.counts["copies"] += 1
             self._copied = True
         elif self._near(raw, self._good, self._since_good):
-            missing = (lost or self._copied) and self._since_good > 1.5 * TIME_STEP
-            if self._suspects:
-                self.counts["spikes"] += 1
-            elif lost or elapsed > self._overdue:
-                self.counts["gaps"] += missing or elapsed > self._overdue
-            if self._suspects or missing or elapsed > self._overdue:
-                self._gap, self._stepped = self._since_good, True
+            gap = elapsed > self._overdue or (lost and elapsed > 1.5 * TIME_STEP)
+            self.counts["spikes"] += self._suspects > 0
+            self.counts["gaps"] += gap
+            if gap or self._suspects or self._copied:
+                self._gap = self._since_good
             self._accept(raw)
         else:
             self._suspects += 1
             if self._suspects > self._options.spike:
-                self._distrust("jumps", already=False)
+                self._distrust("jumps")
 
     def _accept(self, raw: Floats) -> None:
         self._good, self._since_good = raw, 0.0
-        self._suspects, self._copied = 0, False
+        self._suspects, self._waited, self._copied = 0, 0, False
+        if self._heard:
+            self._trend = (raw - self._heard[0]) / (TIME_STEP * len(self._heard))
 
     def _near(self, raw: Floats, reference: Floats, elapsed: float) -> bool:
         """Whether cues can have changed so much in this time."""
         return bool((np.abs(raw - reference) <= self._slew * elapsed).all())
 
-    def _freeze(self, before: Floats, raw: Floats, elapsed: float) -> None:
-        """Measure for how long force and angular velocity have been the same, other than at rest."""
-        same, rest = ((raw == other).reshape(2, 3).all(axis=1) for other in (before, AT_REST))
-        self._frozen = np.where(same & ~rest, self._frozen + elapsed, 0.0)
 
-    @property
-    def _is_stuck(self) -> bool:
-        return bool((self._frozen >= self._options.stuck).any())
+def _trend(rows: deque[Floats]) -> Floats:
+    """(6,) rate of change over rows of one time step each."""
+    return (rows[-1] - rows[0]) / (TIME_STEP * max(len(rows) - 1, 1))
