@@ -1,4 +1,4 @@
-"""Faults of a sender, and what is felt in the cab: every policy that can be served, without network and clock.
+"""Faults of a sender, and what is felt in the cab, for every policy that can be served. No network, no clock.
 
 `python -m benchmarks.loop_faults` prints a table of jerks; docs/results/real-time.md has what it found.
 """
@@ -94,6 +94,29 @@ def _paused(rows: Rows, at: int, seconds: float, skip: int = 0) -> list[Sent]:
     return sent
 
 
+def _wrapped(rows: Rows, at: int, rate: float) -> list[Sent]:
+    """Two samples of a yaw rate that jumps, as the difference of an angle has it at +-180 deg."""
+    out = rows.copy()
+    out[at, 5], out[at + 1, 5] = rate, -rate
+    return _stream(out)
+
+
+def _repeating(rows: Rows, at: int, seconds: float, skip: int = 0) -> list[Sent]:
+    """A paused game that goes on sending its last packet, with fresh numbers and stamps."""
+    return _stream(_inserted(rows, at, np.tile(rows[at - 1], (round(seconds * RATE), 1)), skip))
+
+
+def _frozen(rows: Rows, at: int, seconds: float) -> list[Sent]:
+    """The force repeats, the angular velocity goes on."""
+    out = rows.copy()
+    out[at : at + round(seconds * RATE), :3] = rows[at - 1, :3]
+    return _stream(out)
+
+
+def _noise(rows: Rows, which: NDArray[Any]) -> list[Sent]:
+    return [sent._replace(cues=None) if bad else sent for sent, bad in zip(_stream(rows), which, strict=True)]
+
+
 def _nan(rows: Rows, which: NDArray[Any]) -> list[Sent]:
     rows = rows.copy()
     rows[which, 0] = math.nan
@@ -111,7 +134,10 @@ def _stretch(rows: Rows, at: int, seconds: float) -> NDArray[Any]:
 
 def _late(rows: Rows, which: NDArray[Any], steps: NDArray[Any]) -> list[Sent]:
     """Some packets arrive steps later, in the order of their arrival."""
-    late = [s._replace(arrival=s.arrival + int(n) * bool(w)) for s, w, n in zip(_stream(rows), which, steps, strict=True)]
+    late = [
+        s._replace(arrival=s.arrival + int(n) * bool(w))
+        for s, w, n in zip(_stream(rows), which, steps, strict=True)
+    ]
     return sorted(late, key=lambda sent: sent.arrival)
 
 
@@ -142,24 +168,24 @@ FAULTS: Final[dict[str, Fault]] = {
     "spike of 50 m/s^2": lambda c, at, r: _stream(_added(c, at, 0.01, (0, 50, 0, 0, 0, 0))),
     "spike of 15 m/s^2": lambda c, at, r: _stream(_added(c, at, 0.01, (0, 15, 0, 0, 0, 0))),
     "spikes, 2 %": lambda c, at, r: _stream(c + (r.random((len(c), 1)) < 0.02) * [0, 9, 0, 0, 0, 0]),
-    "Euler wrap of 99 rad/s": lambda c, at, r: _stream(_changed(c, at, [[*c[at, :3], 0, 0, 99], [*c[at, :3], 0, 0, -99]])),
-    "Euler wrap of 4 rad/s": lambda c, at, r: _stream(_changed(c, at, [[*c[at, :3], 0, 0, 4], [*c[at, :3], 0, 0, -4]])),
+    "Euler wrap of 99 rad/s": lambda c, at, r: _wrapped(c, at, 99.0),
+    "Euler wrap of 4 rad/s": lambda c, at, r: _wrapped(c, at, 4.0),
     "zeros for 5 s": lambda c, at, r: _stream(_inserted(c, at, np.zeros((5 * SECOND, 6)))),
     "gravity reversed for 5 s": lambda c, at, r: _stream(_times(c, at, 5.0, (1, 1, -1, 1, 1, 1))),
     "gravity left out for 5 s": lambda c, at, r: _stream(_added(c, at, 5.0, (0, 0, 9.81, 0, 0, 0))),
-    "paused, last packet for 10 s": lambda c, at, r: _stream(_inserted(c, at, np.tile(c[at - 1], (10 * SECOND, 1)))),
-    "paused and moved 2 s on": lambda c, at, r: _stream(_inserted(c, at, np.tile(c[at - 1], (5 * SECOND, 1)), 2 * SECOND)),
+    "paused, last packet for 10 s": lambda c, at, r: _repeating(c, at, 10.0),
+    "paused and moved 2 s on": lambda c, at, r: _repeating(c, at, 5.0, 2 * SECOND),
     "flag of a pause for 5 s": lambda c, at, r: _paused(c, at, 5.0),
     "flag, moved 2 s on": lambda c, at, r: _paused(c, at, 5.0, 2 * SECOND),
     "reset to standing": lambda c, at, r: _stream(_changed(c, at, np.tile(AT_REST, (len(c) - at, 1)))),
     "teleport to 2 s later": lambda c, at, r: _stream(_inserted(c, at, c[:0], 2 * SECOND)),
     "teleport to 2 s before": lambda c, at, r: _stream(_inserted(c, at, c[at - 2 * SECOND :], len(c))),
-    "force frozen for 3 s": lambda c, at, r: _stream(_changed(c, at, np.hstack([np.tile(c[at - 1, :3], (3 * SECOND, 1)), c[at : at + 3 * SECOND, 3:]]))),
+    "force frozen for 3 s": lambda c, at, r: _frozen(c, at, 3.0),
     "a third are copies": lambda c, at, r: _copies(c, r.random(len(c)) < 1 / 3),
     "packets repeated": lambda c, at, r: [s for s in _stream(c) for _ in range(2)],
     "NaN, 5 %": lambda c, at, r: _nan(c, r.random(len(c)) < 0.05),
     "NaN for 1 s": lambda c, at, r: _nan(c, _stretch(c, at, 1.0)),
-    "noise for 1 s": lambda c, at, r: [s._replace(cues=None) if at <= s.arrival < at + SECOND else s for s in _stream(c)],
+    "noise for 1 s": lambda c, at, r: _noise(c, _stretch(c, at, 1.0)),
     "lost, 10 %": lambda c, at, r: _dropped(c, r.random(len(c)) < 0.1),
     "lost for 0.15 s": lambda c, at, r: _dropped(c, _stretch(c, at, 0.15)),
     "lost for 2 s": lambda c, at, r: _dropped(c, _stretch(c, at, 2.0)),
@@ -241,8 +267,14 @@ def main() -> int:
             found = felt(machine, policy, FAULTS[fault](rows, at, np.random.default_rng(0)))
             ok = found.jerk <= 2.0 * own.jerk and found.reach <= NORMAL_RANGE * own.reach
             missed += not ok
-            ratio, reach = (b / a if a > 0 else float(b > 0) for a, b in ((own.jerk, found.jerk), (own.reach, found.reach)))
-            print(f"  {fault:30s} jerk x {ratio:5.2f}  reach x {reach:4.2f} {'' if ok else 'MISSED'}  {found.counts}", flush=True)
+            ratio, reach = (
+                b / a if a > 0 else float(b > 0)
+                for a, b in ((own.jerk, found.jerk), (own.reach, found.reach))
+            )
+            note = "" if ok else "MISSED"
+            print(
+                f"  {fault:30s} jerk x {ratio:5.2f}  reach x {reach:4.2f} {note} {found.counts}", flush=True
+            )
     return int(missed > 0)
 
 

@@ -52,10 +52,9 @@ _DONE: Final = np.repeat([1e-4, 1e-5], 3)
 class GuardOptions:
     """What the guard takes for a car's cues, and how smoothly it reacts to anything else.
 
-    The slews are for road cars. The hardest drives of this package stay below two thirds of them: the standard
-    maneuvers, random drives of each kind on roads of up to 256e-6 m^3 (ISO 8608, average), emergency stops,
-    drives at the limit of the tires, and recorded drives. Their largest are 53 m/s^3 along (a stop), 45 across,
-    68 vertically and 2.3 rad/s^2.
+    The slews are for road cars. The drives of this package stay below two thirds of them: the standard
+    maneuvers, the recorded drives, and random drives of each kind, also on an average road of ISO 8608.
+    Their largest are 62 m/s^3 along (a full stop), 45 across, 68 vertically and 2.3 rad/s^2.
 
     Args:
         force_slew: Fastest plausible change of the horizontal specific force, m/s^3.
@@ -149,14 +148,14 @@ class Guard:
         self._suspects = self._waited = 0
         self._paused = self._copied = False
         self._trend = np.zeros(6)
-        self._heard: deque[Floats] = deque([], _TREND)
+        self._heard: deque[Floats] = deque(maxlen=_TREND)
         self.follows = True
         self.begin()
 
     def begin(self) -> None:
         """The policy begins: nothing was given before."""
         self._blend.stop()
-        self._given: deque[Floats] = deque([], _TREND)
+        self._given: deque[Floats] = deque(maxlen=_TREND)
         self._gap = 0.0
 
     def __call__(self, cues: Cues, paused: bool, accepted: int) -> Floats:
@@ -183,7 +182,7 @@ class Guard:
         return given
 
     def _expected(self) -> Floats:
-        """The cues now: the newest that were believed, led on by their trend where one is known to be missing."""
+        """The newest cues that were believed; led on by their trend where one is known to be missing."""
         missing = self._suspects or self._copied or (self._waited and self._interval < _MISSING * TIME_STEP)
         if not missing or not self._waited:
             return self._good

@@ -53,10 +53,9 @@ _WINDOW: Final = 64
 class CueBounds:
     """Bounds of plausible cues; packets beyond them are not used.
 
-    The defaults are for road cars. Their tires limit the horizontal force to about 10 m/s^2; a racing car with
-    downforce reaches 60. The vertical bound refuses senders that leave gravity out, give it the other sign, or
-    send zeros from a menu: all differ by 9.81 m/s^2 or more. A car that jumps reaches that, too. A car that
-    spins turns at 3 or 4 rad/s.
+    The defaults are for road cars, whose tires limit the horizontal force to about 10 m/s^2. Racing cars with
+    downforce reach more. The vertical bound refuses senders that leave gravity out, give it the other sign,
+    or send zeros from a menu: all differ by 9.81 m/s^2 or more. A car that flies over a crest does, too.
 
     Args:
         force: Largest horizontal specific force on an axis, m/s^2.
