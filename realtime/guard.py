@@ -217,7 +217,8 @@ class Guard:
         stuck = bool((self._frozen >= self._options.stuck).any())
         if not self.follows:
             calm = not stuck and self._near(raw, before, elapsed)
-            self._calm = self._calm + elapsed if calm else 0.0
+            # A pause is no time in which cues were seen to be calm.
+            self._calm = self._calm + min(elapsed, self._overdue) if calm else 0.0
             if self._calm >= self._options.settle:
                 self.follows = True
                 self._accept(raw)
