@@ -16,13 +16,15 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import compilation_announced
 from ..envs.storage import check_file
 from . import arguments
-from .arguments import CarName, ManeuverName, Name, PlatformName, PolicyName, Whole, option
+from .arguments import CarName, ManeuverName, Name, PlatformName, PolicyName, Whole, option, several
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
     from ..realtime.client import Client
     from ..realtime.controller import Controller
+    from ..realtime.inbox import Address
     from ..realtime.machine import LiveMachine
+    from ..realtime.outputs import Output
     from ..realtime.report import LoopReport
     from ..realtime.server import Endpoint, Server
 
@@ -63,10 +65,24 @@ class ServeCommand:
     """How long cues must have come without a gap before the policy begins, s."""
     fade: float = 1.0
     """Time in which the cues come in then, s."""
-    max_force: float = 1000.0
-    """Largest plausible specific force on an axis, m/s^2; packets beyond it are not used."""
-    max_angular_velocity: float = 100.0
+    max_force: float = 30.0
+    """Largest plausible horizontal specific force on an axis, m/s^2; packets beyond it are not used."""
+    max_vertical: float = 9.0
+    """Largest plausible distance of the vertical specific force from that of a standing car, m/s^2."""
+    max_angular_velocity: float = 5.0
     """Largest plausible angular velocity about an axis, rad/s."""
+    max_jerk: float = 100.0
+    """Fastest plausible change of the horizontal specific force, m/s^3; jumps beyond it fade."""
+    max_vertical_jerk: float = 300.0
+    """Of the vertical one, m/s^3."""
+    max_angular_acceleration: float = 10.0
+    """Fastest plausible change of an angular velocity, rad/s^2."""
+    stuck: float = 0.5
+    """Time after which cues that repeat to the bit count as stuck, s."""
+    fault_fade: float = 1.0
+    """Time in which cues fade out and in around a fault or a pause, s."""
+    output: Annotated[tuple[Path, ...], several("FILE.yaml ...")] = ()
+    """Templates of set-points for other motion controllers, which are sent as well."""
     lead: float = 0.001
     """Time before its first set-point at which a step of 10 ms is decided, s; at most a period."""
     cpu: Whole | None = None
@@ -125,6 +141,7 @@ class _Served:
     platform: Platform
     machine: LiveMachine
     controller: Controller
+    outputs: list[tuple[Output, Address]]
 
 
 def run(command: ServeCommand) -> int:
@@ -140,7 +157,14 @@ def run(command: ServeCommand) -> int:
         served = _made(command)
     endpoint = Endpoint(address_of(command.host, command.port))
     try:
-        server = Server(served.controller, endpoint, make_format(command.format), command.rate, command.lead)
+        server = Server(
+            served.controller,
+            endpoint,
+            make_format(command.format),
+            command.rate,
+            command.lead,
+            outputs=served.outputs,
+        )
         _run(command, server, endpoint)
     finally:
         endpoint.close()
@@ -164,21 +188,32 @@ def _check(command: ServeCommand) -> None:
 
 def _made(command: ServeCommand) -> _Served:
     from ..realtime.controller import Controller, ControllerOptions
+    from ..realtime.guard import GuardOptions
     from ..realtime.inbox import CueBounds, Inbox
     from ..realtime.machine import make_machine
+    from ..realtime.outputs import load_output
     from ..realtime.packets import make_format
     from ..realtime.server import address_of
     from ..realtime.watchdog import WatchdogOptions
 
     watchdog = WatchdogOptions(command.overdue, command.hold, command.stale, command.steady, command.fade)
-    options = ControllerOptions(rate=command.rate, watchdog=watchdog)
+    guard = GuardOptions(
+        force_slew=command.max_jerk,
+        vertical_slew=command.max_vertical_jerk,
+        rate_slew=command.max_angular_acceleration,
+        stuck=command.stuck,
+        fade=command.fault_fade,
+    )
+    options = ControllerOptions(rate=command.rate, watchdog=watchdog, guard=guard)
     peer = address_of(command.peer, 0) if command.peer else None
-    bounds = CueBounds(command.max_force, command.max_angular_velocity)
+    bounds = CueBounds(command.max_force, command.max_vertical, command.max_angular_velocity)
     inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)
     platform = arguments.find_platform(command.platform)
+    written = [load_output(file, platform, command.rate) for file in command.output]
+    outputs = [(output, address_of(output.template.to, 0)) for output in written]
     policy = arguments.make_policy(command.policy, platform)
     machine = make_machine(policy, platform, _VESTIBULAR)
-    return _Served(policy, platform, machine, Controller(machine, platform, inbox, options))
+    return _Served(policy, platform, machine, Controller(machine, platform, inbox, options), outputs)
 
 
 def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
@@ -254,6 +289,7 @@ def _report(command: ServeCommand, controller: Controller, server: Server, endpo
         packets={**inbox.counts, "lost": inbox.lost, "unsent": endpoint.unsent},
         states={state: int((states == state).sum()) for state in State},
         faults=controller.faults,
+        guard=controller.guard.counts,
     )
 
 

@@ -1,6 +1,7 @@
 """Real-time loop: a policy as the controller of a motion base; cues arrive, set-points leave."""
 
 from .controller import Controller, ControllerOptions
+from .guard import GuardOptions
 from .machine import make_machine
 from .packets import Cues, FloatsFormat, SetPoint
 from .watchdog import State, WatchdogOptions
@@ -10,6 +11,7 @@ __all__ = [
     "ControllerOptions",
     "Cues",
     "FloatsFormat",
+    "GuardOptions",
     "SetPoint",
     "State",
     "WatchdogOptions",

@@ -1,6 +1,6 @@
 """The controller of the real-time loop: packets in, set-points out, period by period. No clock, no socket.
 
-packets -> inbox -> watchdog -> policy, or brake to neutral -> limits of the machine -> set-points
+packets -> inbox -> guard -> watchdog -> policy, or brake to neutral -> limits of the machine -> set-points
 
 Policies act every 10 ms, as in an evaluation. Set-points within such a time step are interpolated
 (:class:`~.machine.Track`).
@@ -23,10 +23,11 @@ from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.settings import configuration
-from ..envs.simulator.simulator import TIME_STEP
+from ..envs.simulator.simulator import N_AXES, TIME_STEP
 from ..evaluation.rollout import Rollout, record, trajectory_of
 from ..evaluation.suite import FOLLOWED, explain
 from ..evaluation.trajectory import Trajectory
+from .guard import Guard, GuardOptions
 from .inbox import Inbox
 from .machine import AT_REST, LiveMachine, Track
 from .packets import NO_SEQUENCE, SetPoint
@@ -145,11 +146,13 @@ class ControllerOptions:
         rate: Set-points a second; a multiple of the policies' 100.
         watchdog: Its time limits.
         brake: How the machine brakes to neutral.
+        guard: Which cues are believed.
     """
 
     rate: int = 1000
     watchdog: WatchdogOptions = WatchdogOptions()
     brake: BrakeOptions = BrakeOptions()
+    guard: GuardOptions = GuardOptions()
 
     def __post_init__(self) -> None:
         decisions = round(1.0 / TIME_STEP)
@@ -166,9 +169,10 @@ class Controller:
         machine: With the policy.
         platform: The machine's limits.
         inbox: Sorts the packets.
-        options: Rate, watchdog and brake.
+        options: Rate, watchdog, brake and guard.
 
     Attributes:
+        guard: Judges the cues.
         state: Of the watchdog.
         log: Of every time step.
         faults: Errors that the policy raised, in words.
@@ -182,7 +186,9 @@ class Controller:
         self.state, self.log = State.NEUTRAL, LoopLog()
         self.faults: list[str] = []
         self.periods = 0
+        self.guard = Guard(options.guard, options.watchdog.overdue)
         self._brake = BrakeToNeutral(platform, machine.start, options.brake)
+        self._acceleration: Floats = np.zeros(N_AXES)
         self._per_step = round(options.rate * TIME_STEP)
         self._track = Track(self._per_step, TIME_STEP)
         self._motions: Floats = np.zeros((0, 0))
@@ -229,9 +235,11 @@ class Controller:
         self.state = next_state(before, situation, self._options)
         if not self.state.follows and age > self._options.hold:
             self.inbox.reset()
+            self.guard.reset()
         begins = self.state.follows and not before.follows
         if begins:
             self._faded = 0
+            self.guard.begin()
         begin = machine.motion
         try:
             machine.catch_up(self._cues())
@@ -240,6 +248,7 @@ class Controller:
             self._fail(error)
         action, seconds = self._move(begins)
         self.log.add(machine.reference_cue, action, seconds, self.state)
+        self._acceleration = (machine.motion[1, :N_AXES] - begin[1, :N_AXES]) / TIME_STEP
         self._motions = self._track.between(begin, machine.motion)
         self._decided = True
 
@@ -252,7 +261,7 @@ class Controller:
                 return self._machine.act()
             except Exception as error:
                 self._fail(error)
-        action = self._brake.accelerations(self._machine.motion)
+        action = self._brake.accelerations(self._machine.motion, self._acceleration)
         self._machine.move(action)
         return action, math.nan
 
@@ -261,18 +270,15 @@ class Controller:
         self.state = State.BRAKING
 
     def _cues(self) -> Floats:
-        """(6,) cues for the policy: of a standing car unless it acts.
-
-        They fade in when it begins and after a pause of the drive, and out when such a pause begins.
-        """
-        newest, fade = self.inbox.newest, self._options.fade
-        if not self.state.follows or newest is None:
+        """(6,) cues for the policy: of a standing car unless it acts. They fade in when it begins."""
+        inbox, fade = self.inbox, self._options.fade
+        if inbox.newest is None:
             return AT_REST
-        if self.inbox.paused:
-            self._faded = max(min(self._faded, math.ceil(fade / TIME_STEP)) - 1, 0)
-            share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 0.0
-        else:
-            self._echo = newest.sequence, newest.time, self.inbox.arrival
-            share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 1.0
-            self._faded += 1
-        return np.asarray(AT_REST + share * (np.array(newest.force + newest.rate) - AT_REST))
+        cues = self.guard(inbox.newest, inbox.paused, inbox.accepted)
+        if not self.state.follows:
+            return AT_REST
+        if self.guard.follows:
+            self._echo = inbox.newest.sequence, inbox.newest.time, inbox.arrival
+        share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 1.0
+        self._faded += 1
+        return np.asarray(AT_REST + share * (cues - AT_REST))

@@ -6,7 +6,7 @@ kind         cause
 used         it is whole, new and in time
 malformed    size, magic, version or checksum are wrong
 not_finite   a NaN or an infinity
-implausible  beyond the bounds, 1000 m/s^2 and 100 rad/s, or more than 10,000 numbers ahead
+implausible  beyond the bounds of :class:`CueBounds`, or more than 10,000 numbers ahead
 repeated     its number has arrived before
 late         overtaken by a packet with a higher number
 stale        delayed by more than ``stale`` beyond the quickest packet
@@ -18,8 +18,10 @@ paused       the sender says that its drive is paused
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
+from ..envs.cues import GRAVITY
 from ..envs.errors import DataError
 from ..envs.settings import Positive, configuration
 from .packets import Cues, Format
@@ -49,21 +51,33 @@ _WINDOW: Final = 64
 
 @configuration
 class CueBounds:
-    """Bounds of plausible cues on each axis; packets beyond them are not used.
+    """Bounds of plausible cues; packets beyond them are not used.
 
-    The defaults are those of a file of cues, more than any car reaches. Tires limit a road car to about
-    10 m/s^2: 30 m/s^2 and 5 rad/s let all of its drives pass, and stop most faults of a sender.
+    The defaults are for road cars, whose tires limit the horizontal force to about 10 m/s^2. Racing cars with
+    downforce reach more. The vertical bound refuses senders that leave gravity out, give it the other sign,
+    or send zeros from a menu: all differ by 9.81 m/s^2 or more. A car that flies over a crest does, too.
 
     Args:
-        force: Largest specific force, m/s^2.
-        rate: Largest angular velocity, rad/s.
+        force: Largest horizontal specific force on an axis, m/s^2.
+        vertical: Largest distance of the vertical specific force from that of a standing car, m/s^2.
+        rate: Largest angular velocity about an axis, rad/s.
     """
 
-    force: Positive = 1000.0
-    rate: Positive = 100.0
+    force: Positive = 30.0
+    vertical: Positive = 9.0
+    rate: Positive = 5.0
+
+    def allow(self, force: Sequence[float], rate: Sequence[float]) -> bool:
+        """Whether cues are within the bounds."""
+        x, y, z = force
+        return (
+            max(abs(x), abs(y)) <= self.force
+            and abs(z + GRAVITY) <= self.vertical
+            and max(map(abs, rate)) <= self.rate
+        )
 
 
-ANY_CAR: Final = CueBounds()
+ROAD_CAR: Final = CueBounds()
 
 
 class SequenceWindow:
@@ -131,7 +145,7 @@ class Inbox:
         stale: float,
         gap: float,
         peer: Address | None = None,
-        bounds: CueBounds = ANY_CAR,
+        bounds: CueBounds = ROAD_CAR,
     ) -> None:
         self._form, self._stale, self._gap, self._peer, self._bounds = form, stale, gap, peer, bounds
         self.counts = dict.fromkeys(KINDS, 0)
@@ -150,6 +164,11 @@ class Inbox:
         self._lost = self.lost
         self._window = SequenceWindow(_LARGEST_JUMP)
         self._least_delay, self._bound = math.inf, None
+
+    @property
+    def accepted(self) -> int:
+        """Packets that were whole, new and in time."""
+        return self.counts["used"] + self.counts["paused"]
 
     @property
     def lost(self) -> int:
@@ -183,10 +202,10 @@ class Inbox:
         except DataError:
             return "malformed"
         # The numbers of a pause mean nothing, but for its time.
-        force, rate = ((0.0,), (0.0,)) if cues.paused else (cues.force, cues.rate)
-        if not all(map(math.isfinite, (cues.time, *force, *rate))):
+        numbers = () if cues.paused else (*cues.force, *cues.rate)
+        if not all(map(math.isfinite, (cues.time, *numbers))):
             return "not_finite"
-        if max(map(abs, force)) > self._bounds.force or max(map(abs, rate)) > self._bounds.rate:
+        if not (cues.paused or self._bounds.allow(cues.force, cues.rate)):
             return "implausible"
         kind = self._window.put(cues.sequence)
         if kind != "used":

@@ -34,6 +34,7 @@ class LoopReport(Headed):
         states: Counts by state: time steps of a controller, set-points received by a client.
         timings: By name, see :mod:`~.server` and :class:`~.client.Client`.
         faults: Errors that the policy raised, or limits that set-points exceeded.
+        guard: Faults of the cues that a controller's guard found, by kind; see :mod:`~.guard`.
     """
 
     what = "the report of a loop"
@@ -48,6 +49,7 @@ class LoopReport(Headed):
     timings: dict[str, TimingSummary]
     states: dict[str, int] = field(default_factory=dict)
     faults: tuple[str, ...] = ()
+    guard: dict[str, int] = field(default_factory=dict)
 
 
 def report_of(
@@ -57,6 +59,7 @@ def report_of(
     packets: dict[str, int],
     states: Mapping[State, int],
     faults: Sequence[str],
+    guard: Mapping[str, int] | None = None,
 ) -> LoopReport:
     """The report of a run."""
     return LoopReport(
@@ -70,6 +73,7 @@ def report_of(
         states={state.name.lower(): count for state, count in states.items()},
         timings={name: histogram.summary() for name, histogram in run.timings.items()},
         faults=tuple(faults),
+        guard=dict(guard or {}),
     )
 
 
@@ -84,7 +88,10 @@ def summary_lines(report: LoopReport, unit: str) -> list[str]:
         f"{report.overrun} late and {report.skipped} skipped",
         f"packets: {packets or 'none'}",
     ]
-    return [*lines, *([f"{unit}: {states}"] if states else []), *report.faults]
+    found = ", ".join(f"{name} {n}" for name, n in report.guard.items() if n)
+    lines += [f"{unit}: {states}"] if states else []
+    lines += [f"faults of the cues: {found}"] if found else []
+    return [*lines, *report.faults]
 
 
 def timing_table(report: LoopReport) -> TextTable:

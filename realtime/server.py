@@ -19,12 +19,13 @@ import ipaddress
 import select
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from ..envs.errors import ConfigurationError
 from .controller import Controller
 from .inbox import Address
+from .outputs import Output
 from .packets import LARGEST, NO_SEQUENCE, Format
 from .timing import Histogram, Pace
 
@@ -145,6 +146,7 @@ class Server:
         rate: Periods a second.
         lead: Time before its first period at which a time step is decided, s; at most a period.
         clock: Nanoseconds now, as of the endpoint.
+        outputs: Other receivers of the set-points, with the address of each.
 
     Attributes:
         timings: Histograms by name, see the table of the module.
@@ -160,7 +162,9 @@ class Server:
         rate: int,
         lead: float,
         clock: Callable[[], int] = time.perf_counter_ns,
+        outputs: Sequence[tuple[Output, Address]] = (),
     ) -> None:
+        self._outputs = outputs
         self._controller, self._endpoint, self._form, self._rate = controller, endpoint, form, rate
         self._clock = clock
         self._lead = round(1e9 * min(lead, 1.0 / rate))
@@ -202,6 +206,9 @@ class Server:
         sender = self._controller.inbox.sender
         if sender is not None:
             self._endpoint.send(self._form.pack_setpoint(setpoint), sender)
+        for output, address in self._outputs:
+            if setpoint.sequence % output.every == 0:
+                self._endpoint.send(output.datagram(setpoint), address)
         sent = self._clock()
         timings = self.timings
         timings["wake"].add(began - deadline)

@@ -25,6 +25,7 @@ from ..envs.errors import ConfigurationError
 from ..envs.platform import Platform
 from ..envs.platform.kernels.step import TURNTABLE
 from ..envs.settings import NonNegative, Positive, configuration
+from ..envs.simulator.simulator import TIME_STEP
 from ..envs.task.kernels.action import acceleration_scale
 
 Floats = NDArray[np.float64]
@@ -114,14 +115,16 @@ class BrakeOptions:
     Args:
         frequency: Of the spring to the start pose, critically damped, rad/s.
         share: Largest share of each axis' own acceleration limit that it uses.
+        ramp: Time in which it builds up that share: the change from the policy's acceleration has no step, s.
     """
 
     frequency: Positive = 1.0
     share: Positive = 0.5
+    ramp: Positive = 0.5
 
 
 class BrakeToNeutral:
-    """Return to the start pose: a critically damped spring on each axis, with bounded acceleration.
+    """Return to the start pose: a critically damped spring on each axis, with bounded acceleration and jerk.
 
     Args:
         platform: The machine.
@@ -132,13 +135,20 @@ class BrakeToNeutral:
     def __init__(self, platform: Platform, start: Floats, options: BrakeOptions) -> None:
         self._start, self._frequency = start, options.frequency
         self._largest = options.share * acceleration_scale(platform)
+        self._change = self._largest * TIME_STEP / options.ramp
         self._endless = platform.turntable is not None and platform.turntable.travel is None
 
-    def accelerations(self, motion: Floats) -> Floats:
-        """(9,) m/s^2 and rad/s^2 for a motion of :class:`~.machine.MotionView`."""
+    def accelerations(self, motion: Floats, before: Floats) -> Floats:
+        """(9,) m/s^2 and rad/s^2 of the next time step.
+
+        Args:
+            motion: Of :class:`~.machine.MotionView`.
+            before: (9,) accelerations of the time step before.
+        """
         offset, rate = self._offset(motion)
         w = self._frequency
-        return np.asarray(np.clip(-w * w * offset - 2.0 * w * rate, -self._largest, self._largest))
+        spring = np.clip(-w * w * offset - 2.0 * w * rate, -self._largest, self._largest)
+        return np.asarray(before + np.clip(spring - before, -self._change, self._change))
 
     def at_rest(self, motion: Floats) -> bool:
         """Whether the machine rests at the start pose."""

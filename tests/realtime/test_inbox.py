@@ -33,8 +33,8 @@ def test_each_kind_is_counted(inbox):
     assert inbox.take(packet(1)[:-1], ONE, now) == "malformed"
     assert inbox.take(packet(1, force=(math.nan, 0.0, 0.0)), ONE, now) == "not_finite"
     assert inbox.take(packet(1, time=math.inf), ONE, now) == "not_finite"
-    assert inbox.take(packet(1, force=(0.0, 1001.0, 0.0)), ONE, now) == "implausible"
-    assert inbox.take(packet(1, rate=(0.0, 0.0, -101.0)), ONE, now) == "implausible"
+    assert inbox.take(packet(1, force=(0.0, 31.0, -9.81)), ONE, now) == "implausible"
+    assert inbox.take(packet(1, rate=(0.0, 0.0, -5.1)), ONE, now) == "implausible"
     assert inbox.take(packet(10_001), ONE, now) == "implausible"
     assert inbox.take(packet(0), ONE, now) == "repeated"
     assert inbox.take(packet(3), OTHER, now) == "foreign"
@@ -53,10 +53,12 @@ def test_each_kind_is_counted(inbox):
 
 
 def test_cues_beyond_chosen_bounds_are_not_used():
-    inbox = Inbox(FORM, STALE, GAP, bounds=CueBounds(force=30.0, rate=5.0))
-    assert inbox.take(packet(0, force=(30.0, 0.0, -9.81), rate=(0.0, 5.0, 0.0)), ONE, 0.0) == "used"
-    assert inbox.take(packet(1, force=(0.0, -30.1, -9.81)), ONE, 0.0) == "implausible"
-    assert inbox.take(packet(1, rate=(0.0, 0.0, 5.1)), ONE, 0.0) == "implausible"
+    inbox = Inbox(FORM, STALE, GAP, bounds=CueBounds(force=20.0, vertical=6.0, rate=2.0))
+    assert inbox.take(packet(0, force=(20.0, 0.0, -15.8), rate=(0.0, 2.0, 0.0)), ONE, 0.0) == "used"
+    assert inbox.take(packet(1, force=(0.0, -20.1, -9.81)), ONE, 0.0) == "implausible"
+    assert inbox.take(packet(1, rate=(0.0, 0.0, 2.1)), ONE, 0.0) == "implausible"
+    for vertical in (-15.9, -3.7, 0.0, 9.81):
+        assert inbox.take(packet(1, force=(0.0, 0.0, vertical)), ONE, 0.0) == "implausible"
     assert inbox.newest.sequence == 0
     with pytest.raises(ConfigurationError, match="force"):
         CueBounds(force=0.0)
