@@ -292,17 +292,39 @@ def _check_constants(evidence: Evidence, rest: Floats, options: ImportOptions) -
             )
 
 
+_SLOPE: Final = math.radians(1.2)
+_LEAST_MOVING_S: Final = 20.0
+"""A car stands on a slope at a larger angle to the mean of a drive of at least this length, s."""
+
+
 def rest_force(evidence: Evidence) -> tuple[Floats, Origin]:
-    """Specific force without the car's own acceleration: at rest, or as the constant of a regression."""
-    if evidence.still.sum() * evidence.dt >= _STILL_S:
-        return evidence.force[evidence.still].mean(axis=0), "standstill"
+    """Specific force without the car's own acceleration: at rest, or as the constant of a regression.
+
+    A standstill on a slope shows the length of gravity, but not its direction in a level car.
+    """
+    standing = evidence.still.sum() * evidence.dt >= _STILL_S
+    if not standing:
+        return _mean_force(evidence), "average"
+    rest = evidence.force[evidence.still].mean(axis=0)
+    if (~evidence.still).sum() * evidence.dt < _LEAST_MOVING_S or weightless(evidence.force):
+        return rest, "standstill"
+    mean = _mean_force(evidence)
+    size = float(np.linalg.norm(rest))
+    cosine = float(rest @ mean) / (size * float(np.linalg.norm(mean)))
+    if cosine > math.cos(_SLOPE):
+        return rest, "standstill"
+    return mean * (size / float(np.linalg.norm(mean))), "average"
+
+
+def _mean_force(evidence: Evidence) -> Floats:
+    """Constant of a regression of the force (3,) on the car's acceleration."""
     mean = evidence.force.mean(axis=0)
     if weightless(evidence.force):
-        return mean, "average"
+        return np.asarray(mean)
     turning = turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
     # A car that leans by an angle in proportion to v r has a vertical force that varies with its square.
     regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning, turning**2])
-    return np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0], "average"
+    return np.asarray(np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0])
 
 
 def weightless(force: Floats) -> bool:
@@ -451,6 +473,8 @@ def _notes(
         if found < CLEAR and options.lateral_sign == "estimate":
             notes.append(f"too little {what} to check the sense of the lateral axis; taken as right-handed")
     standing = evidence.still.sum() * evidence.dt >= _STILL_S
+    if standing and rest_force(evidence)[1] == "average":
+        notes.append("the car stands on a slope: roll and pitch of the device are from the whole drive")
     if not standing and evidence.course is None and options.rate_bias_deg_s is None:
         notes.append("neither standstill nor course: the bias of the yaw rate is taken as zero")
     if rate_course is None and options.rate_sign == "estimate":
