@@ -1,4 +1,4 @@
-"""What loggers do besides: damaged files, numbers that stand for none, units and axes that change, local clocks."""
+"""What loggers do besides: damaged files, numbers for no value, units and axes that change, local clocks."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_a_packed_file_that_was_cut_off(tmp_path: Path) -> None:
     content = gzip.compress(write(tmp_path / "whole.csv", table()).read_bytes())
     path = tmp_path / "log.csv.gz"
     path.write_bytes(content[: len(content) // 2])
-    with pytest.raises(DataError, match="the packed file is cut off.*damage='mend'"):
+    with pytest.raises(DataError, match=r"the packed file is cut off.*damage='mend'"):
         import_log(path, WITH_COURSE)
     result = import_log(path, WITH_COURSE, options=ImportOptions(damage="mend"))
     assert 20.0 < result.trace.duration < 40.0
