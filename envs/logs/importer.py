@@ -317,9 +317,9 @@ def _find(
     check_fastest(evidence, units)
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
     evidence = evidence.delayed(delay)
+    check_constancy(evidence, options)
     check_gravity(evidence, options)
     check_standstill(evidence)
-    check_constancy(evidence, options)
     device = estimate(evidence, options)
     if options.speed_delay_s is None and delay >= LONGEST_DELAY_S - 1e-6:
         note = (

@@ -6,7 +6,6 @@ v r that of the yaw rate, and the course that of the yaw rate once more.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ import numpy as np
 
 from ..cues import GRAVITY, Floats
 from ..errors import DataError
-from .mounting import Evidence, Mounting, correlation, detrended, level, rest_force, turn, weightless
+from .mounting import Evidence, Mounting, correlation, detrended, rest_force, turn, weightless
 from .signals import ImportOptions
 from .units import RATES, UNITS
 
@@ -174,10 +173,7 @@ def check_gravity(evidence: Evidence, options: ImportOptions) -> None:
 
 _PART_S: Final = 15.0
 _LARGEST_TILT: Final = math.radians(40.0)
-_LARGEST_TURN: Final = math.radians(60.0)
-_EXCITED: Final = 0.6
-"""Parts of a drive, s, whose mean force may differ in direction by the first angle. Their horizontal force
-may be turned against the car's motion by the second, where both have this standard deviation, m/s^2."""
+"""Parts of a drive, s, whose mean force may differ in direction by so much."""
 
 
 def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
@@ -188,7 +184,7 @@ def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
     """
     length = int(_PART_S / evidence.dt)
     parts = [slice(first, first + length) for first in range(0, len(evidence.force) - length + 1, length)]
-    if options.slopes == "accept" or len(parts) < 2:
+    if options.slopes == "accept" or len(parts) < 2 or weightless(evidence.force):
         return
     means = np.array([evidence.force[part].mean(axis=0) for part in parts])
     sizes = np.linalg.norm(means, axis=1)
@@ -207,41 +203,6 @@ def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
                 f"{when}: the device moved, or its axes change; leave one part out with start_s or end_s, or "
                 "set slopes='accept'"
             )
-    _check_turned(evidence, parts)
-
-
-def _check_turned(evidence: Evidence, parts: list[slice]) -> None:
-    """Refuse a horizontal force that is turned against dv/dt and v r otherwise in another part."""
-    if evidence.speed is None:
-        return
-    down = -rest_force(evidence)[0]
-    down = down / np.linalg.norm(down)
-    roll, pitch = level(-down)
-    leveled = Mounting(roll, pitch)
-    force = leveled.force_in_car(evidence.force)
-    # As complex numbers: the angle of one against the other is the yaw of the device.
-    felt = force[:, 0] + 1j * force[:, 1]
-    moved = evidence.speed_rate + 1j * turn(evidence, evidence.rate @ down)
-    for mirrored in (False, True):
-        found: list[tuple[int, complex]] = []
-        for part in parts:
-            a, b = felt[part] - felt[part].mean(), moved[part] - moved[part].mean()
-            a = np.conj(a) if mirrored else a
-            size = float(np.linalg.norm(a) * np.linalg.norm(b))
-            if min(a.real.std(), a.imag.std(), b.real.std(), b.imag.std()) >= _EXCITED and size > 0.0:
-                found.append((part.start, complex(np.vdot(a, b)) / size))
-        clear = [(start, one) for start, one in found if abs(one) >= 0.85]
-        if len(clear) < 2 or len(clear) < len(found):
-            continue
-        for (_, before), (start, after) in itertools.pairwise(clear):
-            angle = abs(float(np.angle(after / before)))
-            if angle > _LARGEST_TURN:
-                raise DataError(
-                    f"the horizontal force turns by {math.degrees(angle):.0f} deg against the car's motion "
-                    f"at about {start * evidence.dt:.0f} s of the import: the device moved, or its axes "
-                    "change; leave one part out with start_s or end_s, or set slopes='accept'"
-                )
-        return
 
 
 def check_fastest(evidence: Evidence, units: Mapping[str, str]) -> None:

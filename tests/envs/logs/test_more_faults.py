@@ -161,22 +161,14 @@ def test_a_unit_that_changes(tmp_path: Path, kind: str, earlier: bool) -> None:
         imported(tmp_path, columns)
 
 
-AXES = {
-    "x and y": (("ax", "ay", "wx", "wy"), ("ay", "ax", "wy", "wx"), "horizontal force turns by"),
-    "y and z": (("ay", "az", "wy", "wz"), ("az", "ay", "wz", "wy"), "the vertical tilts by"),
-}
-
-
-@pytest.mark.parametrize("kind", AXES)
-def test_axes_that_change(tmp_path: Path, kind: str) -> None:
-    names, others, message = AXES[kind]
+def test_axes_that_change(tmp_path: Path) -> None:
+    """Half of the log has y and z swapped, as from a phone that fell over."""
     columns = table()
-    changed = dict(columns)
     later = columns["t"] >= 30.0
-    for name, other in zip(names, others, strict=True):
-        sign = -1.0 if name in ("ax", "wx") or (kind == "y and z" and name in ("ay", "wy")) else 1.0
+    changed = dict(columns)
+    for name, other, sign in (("ay", "az", -1.0), ("az", "ay", 1.0), ("wy", "wz", -1.0), ("wz", "wy", 1.0)):
         changed[name] = np.where(later, sign * columns[other], columns[name])
-    with pytest.raises(DataError, match=message):
+    with pytest.raises(DataError, match=r"the vertical tilts by .* the device moved, or its axes change"):
         imported(tmp_path, changed)
 
 
