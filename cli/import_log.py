@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -36,13 +39,18 @@ class ImportCommand:
     """
 
     file: Annotated[Path, option("LOG")] = field(kw_only=False)
-    """Log to convert: CSV with a header row, or .csv.gz."""
-    columns: Annotated[tuple[str, ...], several("SIGNAL=COLUMN[:UNIT] ...")]
-    """Columns of the signals time [s, ms, us, ns, hhmmss], force_x force_y force_z [m/s2, g], rate_x rate_y
-    rate_z [rad/s, deg/s], speed [m/s, km/h, mph] and course [rad, deg]; the first unit is the default. `-`
-    before a column reverses it; a number instead of one is a constant. Speed and course may be missing."""
-    out: Annotated[Path, option("FILE")]
+    """Log to convert: CSV of any dialect, also packed, RaceLogic VBO, ASAM MDF, MCAP, a ROS bag, or the
+    folder or zip file of a phone's logger."""
+    columns: Annotated[tuple[str, ...], several("SIGNAL=COLUMN[:UNIT] ...")] = ()
+    """Columns to take instead of those that are found, of the signals time [s, ms, us, ns, hhmmss], force_x
+    force_y force_z [m/s2, g, mg, ft/s2], rate_x rate_y rate_z [rad/s, deg/s], speed [m/s, km/h, mph, kn] and
+    course [rad, deg]. The default unit is that of the file, or the first. `-` before a column reverses it; a
+    number instead of one is a constant; none leaves the signal out. If all forces and rates and the time are
+    given, no others are added."""
+    out: Annotated[Path | None, option("FILE")] = None
     """Cues to write, as CSV; packed if the name ends in .gz. Its .findings.txt is written beside it."""
+    dry_run: bool = False
+    """Show the format and the columns that would be taken, with their units, and write nothing."""
     plot: Annotated[Path | None, option("FILE.png")] = None
     """Picture (PNG) to write: cues against the car's own motion, raw signals, spectra."""
     decimals: Whole | None = None
@@ -55,25 +63,17 @@ def run(command: ImportCommand) -> int:
     """Convert, write, and print the findings."""
     if command.decimals is not None and not 0 <= command.decimals <= _MOST_DECIMALS:
         raise ConfigurationError(f"decimals is {command.decimals}; use 0 to {_MOST_DECIMALS}")
-    if command.out.resolve() == command.file.resolve():
-        raise ConfigurationError(f"--out {command.out} is the log itself; name another file")
-    check_file("--out", command.out)
-    name = command.out.name.removesuffix(".gz").removesuffix(".csv")
-    findings = command.out.with_name(f"{name}.findings.txt")
-    if findings.resolve() == command.file.resolve():
-        raise ConfigurationError(
-            f"--out {command.out}: its findings would overwrite the log; name another file"
-        )
-    check_file("--out", findings)
-    if command.plot is not None:
-        _check_plot(command.plot, command)
+    columns, units = parse_columns(command.columns)
+    if command.dry_run:
+        return _show(command, columns, units)
+    if command.out is None:
+        raise ConfigurationError("--out is missing: name a file for the cues, or look with --dry-run")
+    findings = _checked_targets(command, command.out)
     from ..envs.logs.importer import import_log
 
-    columns, units = parse_columns(command.columns)
-    try:
+    name = findings.name.removesuffix(".findings.txt")
+    with _flags():
         imported = import_log(command.file, columns, units=units, options=command.conversion, name=name)
-    except DataError as error:
-        raise DataError(with_flags(str(error), [one.name for one in fields(ImportOptions)])) from None
     imported.trace.to_csv(command.out, decimals=command.decimals)
     lines = "\n".join(imported.findings.lines())
     write_text(findings, lines + "\n")
@@ -85,10 +85,55 @@ def run(command: ImportCommand) -> int:
     return 0
 
 
-def _check_plot(plot: Path, command: ImportCommand) -> None:
+def _show(command: ImportCommand, columns: dict[str, str], units: dict[str, str]) -> int:
+    """Print what a file is, and what an import would take from it."""
+    from ..envs.logs.importer import select_columns
+    from ..envs.logs.readers import read_recording
+
+    with _flags():
+        recording = read_recording(command.file, command.conversion)
+        print(f"format  {recording.format}")
+        for table in recording.tables:
+            columns_of = ", ".join(
+                column.name + (f" [{column.unit}]" if column.unit else "") for column in table.columns
+            )
+            print(f"holds   {table.name + ': ' if table.name else ''}{columns_of}")
+        selection = select_columns(recording, columns, units, command.conversion)
+    for line in selection.lines():
+        print(f"takes   {line}")
+    print("\n--columns " + " ".join(map(shlex.quote, selection.words())))
+    return 0
+
+
+@contextmanager
+def _flags() -> Iterator[None]:
+    """Errors of an import, with options in place of fields."""
+    names = [one.name for one in fields(ImportOptions)]
+    try:
+        yield
+    except (ConfigurationError, DataError) as error:
+        raise type(error)(with_flags(str(error), names)) from None
+
+
+def _checked_targets(command: ImportCommand, out: Path) -> Path:
+    """The file for the findings, after all targets were checked."""
+    if out.resolve() == command.file.resolve():
+        raise ConfigurationError(f"--out {out} is the log itself; name another file")
+    check_file("--out", out)
+    name = out.name.removesuffix(".gz").removesuffix(".csv")
+    findings = out.with_name(f"{name}.findings.txt")
+    if findings.resolve() == command.file.resolve():
+        raise ConfigurationError(f"--out {out}: its findings would overwrite the log; name another file")
+    check_file("--out", findings)
+    if command.plot is not None:
+        _check_plot(command.plot, command.file, out)
+    return findings
+
+
+def _check_plot(plot: Path, log: Path, out: Path) -> None:
     if plot.suffix.lower() != ".png":
         raise ConfigurationError(f"--plot {plot} does not end in .png, the only format of the picture")
-    if plot.resolve() in (command.file.resolve(), command.out.resolve()):
+    if plot.resolve() in (log.resolve(), out.resolve()):
         raise ConfigurationError(f"--plot {plot} is the log or the cues; name another file")
     check_file("--plot", plot)
 

@@ -12,7 +12,8 @@ from scipy.ndimage import label, median_filter
 from ..cues import Floats
 from ..errors import DataError
 from .mounting import Evidence
-from .signals import FORCES, RATES, RECEIVED, UNITS, Change, ImportOptions, RawLog
+from .signals import RECEIVED, Change, ImportOptions, RawLog
+from .units import FORCES, RATES, UNITS
 
 _LEAST_SPIKE: Final = {**dict.fromkeys(FORCES, 8.0), **dict.fromkeys(RATES, 1.0), "speed": 5.0}
 """A smaller deviation from the running median is no outlier, m/s^2, rad/s, m/s."""
@@ -94,8 +95,15 @@ _COURSE_IS_KNOWN: Final = 2.0
 """Speed below which receivers hold their last course, m/s."""
 
 
-def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]:
+def drop_frozen(
+    log: RawLog, options: ImportOptions, receiver: RawLog | None = None
+) -> tuple[RawLog, list[Change]]:
     """The log with empty cells where a sensor held one value, and what was changed.
+
+    Args:
+        log: Signals of one clock.
+        options: Whether gaps are refused.
+        receiver: Log with the speed, if it has another clock.
 
     Raises:
         DataError: a sensor froze, and the options refuse gaps.
@@ -103,10 +111,14 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
     frozen: dict[tuple[int, int], list[str]] = {}
     for name in (name for name in (*FORCES, *RATES, *RECEIVED) if name in log.signals):
         for hold in _frozen(log.time, log.signals[name]):
+            value = log.signals[name][hold[0]]
+            extreme = value in (np.nanmin(log.signals[name]), np.nanmax(log.signals[name]))
+            if options.saturation == "accept" and extreme:
+                continue
             slow = (
                 max(options.standstill_m_s, _COURSE_IS_KNOWN) if name == "course" else options.standstill_m_s
             )
-            if _slower(log, hold, slow):
+            if _slower(log, receiver or log, hold, slow):
                 continue
             frozen.setdefault(hold, []).append(name)
     signals, changes = dict(log.signals), list[Change]()
@@ -126,9 +138,12 @@ def drop_frozen(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Chang
     return replace(log, signals=signals), changes
 
 
-def _slower(log: RawLog, hold: tuple[int, int], speed: float) -> bool:
+def _slower(log: RawLog, receiver: RawLog, hold: tuple[int, int], speed: float) -> bool:
     """Whether the car is slower than ``speed`` for most of a hold: then what hardly changes may hold."""
-    found = log.signals.get("speed", np.array([np.nan]))[hold[0] : hold[1] + 1]
+    if "speed" not in receiver.signals:
+        return False
+    first, last = log.time[hold[0]], log.time[hold[1]]
+    found = receiver.signals["speed"][(receiver.time >= first) & (receiver.time <= last)]
     return bool(np.any(np.isfinite(found)) and np.nanmedian(found) < speed)
 
 
@@ -170,6 +185,87 @@ def _frozen(time: Floats, values: Floats) -> list[tuple[int, int]]:
     return found
 
 
+_LEAST_CUT: Final = (3, 2)
+"""A sensor is cut off if it holds its largest value for so many samples, so many times."""
+
+_CUT_STEPS: Final = 3.0
+"""It comes to that value and leaves it in steps of at least so many median steps."""
+
+
+def check_range(log: RawLog, options: ImportOptions) -> list[Change]:
+    """What was accepted of sensors that are cut off at the ends of their range.
+
+    Raises:
+        DataError: a sensor is cut off, and the options refuse that.
+    """
+    changes = []
+    for name in (name for name in (*FORCES, *RATES) if name in log.signals):
+        known = np.flatnonzero(np.isfinite(log.signals[name]))
+        values = log.signals[name][known]
+        runs = [] if len(values) < 3 else _cut_off(values)
+        if not runs:
+            continue
+        first = known[runs[0][0]]
+        unit = next(iter(UNITS[name]))
+        fault = (
+            f"{name} is cut off at {values[runs[0][0]]:.4g} {unit} at data row {log.rows[first]} "
+            f"({log.time[first]:.3f} s, {len(runs)} times in all)"
+        )
+        if options.saturation == "refuse":
+            raise DataError(
+                f"{fault}: the sensor is at the end of its range; set saturation='accept', or leave that "
+                "part out with start_s or end_s"
+            )
+        places = tuple(float(log.time[known[start]]) for start, _ in runs)
+        changes.append(Change(f"{fault}: accepted as it is", places))
+    return changes
+
+
+def _cut_off(values: Floats) -> list[tuple[int, int]]:
+    """First and last sample of each steep plateau at the largest or smallest value."""
+    steps = np.abs(np.diff(values))
+    moving = steps[steps > 0.0]
+    if not len(moving):
+        return []
+    least, found = _CUT_STEPS * float(np.median(moving)), []
+    for end in (values.max(), values.min()):
+        starts = np.flatnonzero(np.diff(np.r_[False, values == end, False].astype(np.int8)))
+        runs = list(zip(starts[::2].tolist(), (starts[1::2] - 1).tolist(), strict=True))
+        inner = [(a, b) for a, b in runs if a > 0 and b < len(values) - 1]
+        steep = [
+            (a, b) for a, b in inner if b - a + 1 >= _LEAST_CUT[0] and min(steps[a - 1], steps[b]) >= least
+        ]
+        if len(steep) >= _LEAST_CUT[1]:
+            found += steep
+    return sorted(found)
+
+
+_LEAST_HELD: Final = (3, 0.8)
+"""Values are held if they change after so many rows or more, and this share after as many as the median."""
+
+
+def thin_holds(log: RawLog, options: ImportOptions) -> tuple[RawLog, list[Change]]:
+    """The log with values only where they are new, if they are held over a fixed number of rows."""
+    if options.holds == "keep":
+        return log, []
+    signals, found = dict(log.signals), dict[int, list[str]]()
+    for name, values in log.signals.items():
+        new = np.flatnonzero(np.r_[True, (values[1:] != values[:-1]) & np.isfinite(values[1:])])
+        lengths = np.diff(new)
+        if len(lengths) < 10:
+            continue
+        rows = int(np.median(lengths))
+        if rows >= _LEAST_HELD[0] and np.mean(np.abs(lengths - rows) <= 1) >= _LEAST_HELD[1]:
+            signals[name] = np.full(len(values), np.nan)
+            signals[name][new] = values[new]
+            found.setdefault(rows, []).append(name)
+    changes = [
+        Change(f"{', '.join(names)} held each value for {rows} rows: thinned out to the rows with news")
+        for rows, names in found.items()
+    ]
+    return replace(log, signals=signals), changes
+
+
 def check_speed(log: RawLog) -> None:
     """Refuse a speed that dies or wakes between two samples.
 
@@ -184,6 +280,7 @@ def check_speed(log: RawLog) -> None:
     if not len(steps):
         return
     # Across a gap of the log, a speed may change.
+    _check_unit_of_speed(log, known, speed, steps)
     dead = (
         (apart <= 2.5 * np.median(apart))
         & (steps > _LARGEST_SPEED_STEP)
@@ -197,6 +294,20 @@ def check_speed(log: RawLog) -> None:
             f"({log.time[known[at]]:.3f} s): the channel died or woke; leave that part out with start_s or "
             "end_s, or name no column for speed"
         )
+
+
+def _check_unit_of_speed(log: RawLog, known: NDArray[np.intp], speed: Floats, steps: Floats) -> None:
+    """Refuse a speed that jumps by the factor of two units."""
+    for factor, units in ((3.6, "m/s and km/h"), (2.23694, "m/s and mph"), (1.609344, "mph and km/h")):
+        for before, after in ((speed[:-1], speed[1:]), (speed[1:], speed[:-1])):
+            jumps = (steps > 4.0) & (np.abs(after - factor * before) < 0.03 * np.abs(after))
+            if np.sum(jumps) == 1 and steps.max() == steps[jumps][0]:
+                at = int(np.argmax(jumps)) + 1
+                raise DataError(
+                    f"speed jumps from {speed[at - 1]:.3g} to {speed[at]:.3g} m/s at data row "
+                    f"{log.rows[known[at]]} ({log.time[known[at]]:.3f} s), by {factor:.3g}, the factor of "
+                    f"{units}: its unit changes; leave one part out with start_s or end_s"
+                )
 
 
 def check_standstill(evidence: Evidence) -> None:

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from ..cues import GRAVITY, CueTrace, Floats
 from ..errors import DataError
-from .channels import check_speed, check_standstill, drop_frozen, mend_spikes
+from .channels import (
+    check_range,
+    check_speed,
+    check_standstill,
+    drop_frozen,
+    mend_spikes,
+    thin_holds,
+)
+from .computed import with_rates
 from .mounting import (
     CLEAR,
     LONGEST_DELAY_S,
@@ -27,23 +35,32 @@ from .mounting import (
     speed_delay,
     yaw_bias,
 )
-from .plausibility import Slopes, check_fastest, check_gravity, check_slopes, silent_stretches
+from .plausibility import (
+    Slopes,
+    check_constancy,
+    check_fastest,
+    check_gravity,
+    check_slopes,
+    silent_stretches,
+)
+from .proposal import Proposal
+from .readers import read_recording
+from .readers.recording import Recording
+from .selection import selected, take
 from .signals import (
-    FORCES,
-    RATES,
-    REQUIRED,
     Change,
     Grid,
     ImportOptions,
     RawLog,
+    Series,
     Timing,
     close_gaps,
     low_pass,
     make_grid,
     on_grid,
-    read_log,
 )
-from .timing import in_order
+from .timing import in_order, without_repeats
+from .units import FORCES, RATES
 
 SPEED_CUTOFF_HZ: Final = 1.0
 """Cut-off of the speed channel, Hz: satellite and wheel speeds come in steps of about a tenth of a second."""
@@ -60,6 +77,8 @@ class Findings:
         speed_delay: How long the speed lags behind the force, s.
         gravity: Gravity as the device measures it, m/s^2.
         changes: What was mended in the log, by choice, with places in the trace's time.
+        format: Of the file, with its dialect.
+        selection: Columns that were taken, with their units.
     """
 
     timing: Timing
@@ -68,6 +87,8 @@ class Findings:
     speed_delay: float
     gravity: float
     changes: tuple[Change, ...] = ()
+    format: str = ""
+    selection: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """A report for people, angles in degrees."""
@@ -76,6 +97,8 @@ class Findings:
         bias = ", ".join(f"{math.degrees(b):.2f}" for b in d.rate_bias)
         course = "no course" if d.rate_course is None else f"{d.rate_course:.3f}"
         return [
+            f"format             {self.format}",
+            *(f"column             {line}" for line in self.selection),
             f"rows               {t.rows}, {t.rate_hz:.1f} Hz, longest step {t.longest_step_s:.3f} s",
             f"missing            {t.repeated} stamps, {t.empty_cells} cells; {t.bridged} gaps bridged",
             f"mounting           roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} deg",
@@ -112,7 +135,7 @@ class ImportedLog:
 
 def import_log(
     path: str | Path,
-    columns: Mapping[str, str],
+    columns: Mapping[str, str] | None = None,
     *,
     units: Mapping[str, str] | None = None,
     options: ImportOptions | None = None,
@@ -125,11 +148,12 @@ def import_log(
     f = [0, 0, -9.81], and low-pass without delay.
 
     Args:
-        path: A CSV file with a header row.
+        path: A file of any format that :data:`.readers.FORMATS` lists.
         columns: Column of each signal (``time``, ``force_x`` to ``force_z``, ``rate_x`` to
             ``rate_z``, and, if there are any, ``speed`` and ``course``). A leading ``-``
-            reverses a column; a number stands for a constant.
-        units: Unit of each signal, see :data:`.signals.UNITS`; SI by default.
+            reverses a column; a number stands for a constant, ``none`` for no column. The log's own
+            columns are found for signals that are missing here.
+        units: Unit of each signal, see :data:`.units.UNITS`; that of the file, or SI, by default.
         options: Rate, filter, gaps, and what shall not be estimated.
         name: Name of the trace; that of the file by default.
 
@@ -138,30 +162,93 @@ def import_log(
         DataError: the log is broken, or does not show what has to be estimated.
     """
     options = options or ImportOptions()
-    computed = options.force == "from-speed"
-    required = ("time", "speed", *RATES) if computed else REQUIRED
-    log, changes = in_order(read_log(path, columns, units or {}, required), options)
-    log = _cut(log, options)
-    for mend in (mend_spikes, drop_frozen):
-        log, mended = mend(log, options)
-        changes += mended
-    check_speed(log)
-    series, timing = close_gaps(log, options)
+    return import_recording(
+        read_recording(path, options),
+        columns or {},
+        units=units,
+        options=options,
+        name=name or Path(path).stem,
+        source=path,
+    )
+
+
+def import_recording(
+    recording: Recording,
+    columns: Mapping[str, str],
+    *,
+    units: Mapping[str, str] | None = None,
+    options: ImportOptions | None = None,
+    name: str,
+    source: str | Path,
+) -> ImportedLog:
+    """Turn a recording into cues, as :func:`import_log` does; ``source`` is the file, for messages."""
+    options = options or ImportOptions()
+    selection = select_columns(recording, columns, units or {}, options)
+    changes = list(recording.changes)
+    logs = []
+    for log in take(recording, selection, source):
+        try:
+            log, repeats = without_repeats(log, options)
+            log, mended = in_order(log, options)
+        except DataError as error:
+            raise DataError(f"{log.clock}: {error}" if log.clock else str(error)) from None
+        logs.append(_cut(log, options))
+        changes += [*repeats, *mended]
+        changes += [
+            Change(f"{signal}: {number:.6g} taken as no value ({count} in all, first at data row {row})")
+            for signal, (number, row, count) in log.no_values.items()
+        ]
+    speed = next((log for log in logs if "speed" in log.signals), None)
+    series: dict[str, Series] = {}
+    timings = []
+    for log in logs:
+        log, thinned = thin_holds(log, options)
+        log, spikes = mend_spikes(log, options)
+        saturated = check_range(log, options)
+        log, holds = drop_frozen(log, options, speed)
+        check_speed(log)
+        changes += [*thinned, *spikes, *saturated, *holds]
+        found, timing = close_gaps(log, options)
+        series |= found
+        timings.append(timing)
+    timing = replace(
+        timings[0],
+        repeated=sum(one.repeated for one in timings),
+        empty_cells=sum(one.empty_cells for one in timings),
+        bridged=sum(one.bridged for one in timings),
+    )
     grid = make_grid(series, options.rate_hz, timing.rate_hz)
-    raw = {signal: on_grid(values, grid) for signal, values in series.items()}
-    if computed:
+    raw = {signal: on_grid(series[signal], grid) for signal in selection.columns if signal in series}
+    if options.force == "from-speed":
         raw, options, change = _with_force(raw, grid, options)
         changes.append(change)
     elif options.gravity == "add":
         raw, options, change = _with_gravity(raw, options)
         changes.append(change)
-    findings = _find(raw, grid, timing, changes, units or {}, options)
+    if options.rates != "measured":
+        raw, options, change = with_rates(raw, grid, options)
+        changes.append(change)
+    findings = _find(raw, grid, timing, changes, selection.units, options)
     return ImportedLog(
-        trace=_trace(name or Path(path).stem, str(Path(path).name), raw, grid, findings, options),
-        findings=findings,
+        trace=_trace(name, Path(source).name, raw, grid, findings, options),
+        findings=replace(findings, format=recording.format, selection=tuple(selection.lines())),
         raw_force=_stacked(raw, FORCES)[:: grid.every],
         raw_rate=_stacked(raw, RATES)[:: grid.every],
     )
+
+
+def select_columns(
+    recording: Recording, columns: Mapping[str, str], units: Mapping[str, str], options: ImportOptions
+) -> Proposal:
+    """The columns that an import with these options takes from a recording."""
+    required = ["time", *(FORCES if options.force == "measured" else ("speed",))]
+    unused = [] if options.force == "measured" else [*FORCES]
+    if options.rates == "measured":
+        required += RATES
+    else:
+        required += ["course"] if options.rates == "from-course" else ["speed"]
+        unused += RATES
+    return selected(recording, columns, units, tuple(dict.fromkeys(required)), tuple(unused))
 
 
 def _with_force(
@@ -230,6 +317,7 @@ def _find(
     check_fastest(evidence, units)
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
     evidence = evidence.delayed(delay)
+    check_constancy(evidence, options)
     check_gravity(evidence, options)
     check_standstill(evidence)
     device = estimate(evidence, options)

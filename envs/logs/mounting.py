@@ -18,7 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from ..cues import Floats
 from ..errors import DataError
-from .signals import FORCES, ImportOptions, Sign, low_pass
+from .signals import ImportOptions, Sign, low_pass
+from .units import FORCES
 
 
 @dataclass(frozen=True)
@@ -254,6 +255,9 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     rate_sign, rate_course = _rate_sign(evidence, leveled, options.rate_sign)
     yaw, lateral_sign = _heading(evidence, leveled, rate_sign, options)
     mounting = Mounting(roll, pitch, yaw, lateral_sign, rate_sign)
+    straight = options.rate_sign == "estimate" and rate_course is not None and abs(rate_course) < CLEAR
+    if straight and _squat(evidence, mounting) < -CLEAR:
+        mounting = replace(mounting, rate_sign=-rate_sign)
     bias, bias_from = _rate_bias(evidence, mounting, options)
     force_speed, force_turn = _agreement(evidence, mounting)
     if options.yaw_deg is None and max(force_speed, force_turn) < CLEAR:
@@ -288,17 +292,39 @@ def _check_constants(evidence: Evidence, rest: Floats, options: ImportOptions) -
             )
 
 
+_SLOPE: Final = math.radians(1.2)
+_LEAST_MOVING_S: Final = 20.0
+"""A car stands on a slope at a larger angle to the mean of a drive of at least this length, s."""
+
+
 def rest_force(evidence: Evidence) -> tuple[Floats, Origin]:
-    """Specific force without the car's own acceleration: at rest, or as the constant of a regression."""
-    if evidence.still.sum() * evidence.dt >= _STILL_S:
-        return evidence.force[evidence.still].mean(axis=0), "standstill"
+    """Specific force without the car's own acceleration: at rest, or as the constant of a regression.
+
+    A standstill on a slope shows the length of gravity, but not its direction in a level car.
+    """
+    standing = evidence.still.sum() * evidence.dt >= _STILL_S
+    if not standing:
+        return _mean_force(evidence), "average"
+    rest = evidence.force[evidence.still].mean(axis=0)
+    if (~evidence.still).sum() * evidence.dt < _LEAST_MOVING_S or weightless(evidence.force):
+        return rest, "standstill"
+    mean = _mean_force(evidence)
+    size = float(np.linalg.norm(rest))
+    cosine = float(rest @ mean) / (size * float(np.linalg.norm(mean)))
+    if cosine > math.cos(_SLOPE):
+        return rest, "standstill"
+    return mean * (size / float(np.linalg.norm(mean))), "average"
+
+
+def _mean_force(evidence: Evidence) -> Floats:
+    """Constant of a regression of the force (3,) on the car's acceleration."""
     mean = evidence.force.mean(axis=0)
     if weightless(evidence.force):
-        return mean, "average"
+        return np.asarray(mean)
     turning = turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
     # A car that leans by an angle in proportion to v r has a vertical force that varies with its square.
     regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning, turning**2])
-    return np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0], "average"
+    return np.asarray(np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0])
 
 
 def weightless(force: Floats) -> bool:
@@ -371,13 +397,33 @@ def _heading(
         yaw = math.radians(options.yaw_deg)
         return float(np.cos(yaw) * cosine + np.sin(yaw) * sine), yaw
 
+    trials = {sign: Mounting(leveled.roll, leveled.pitch, fit(sign)[1], sign, rate_sign) for sign in (1, -1)}
     mirrored = options.lateral_sign == "flip"
-    if options.lateral_sign == "estimate" and fit(-1)[0] > fit(1)[0]:
-        trial = Mounting(leveled.roll, leveled.pitch, fit(-1)[1], -1, rate_sign)
-        # A reflection shows only where both axes are excited.
-        mirrored = min(_agreement(evidence, trial)) >= CLEAR
+    if options.lateral_sign == "estimate":
+        best = max(trials, key=lambda sign: fit(sign)[0])
+        # A reflection shows only where both axes are excited. Otherwise the lean of the body decides.
+        if min(_agreement(evidence, trials[best])) >= CLEAR:
+            mirrored = best == -1
+        elif evidence.course is not None:
+            mirrored = _lean(evidence, trials[1]) < -CLEAR and _lean(evidence, trials[-1]) > CLEAR
     sign = -1 if mirrored else 1
     return fit(sign)[1], sign
+
+
+def _lean(evidence: Evidence, mounting: Mounting) -> float:
+    """Correlation of the roll rate with that of a body which leans out of its turns, in proportion to f_y."""
+    lateral = mounting.force_in_car(evidence.force)[:, 1]
+    roll_rate = mounting.rate_in_car(evidence.rate)[:, 0]
+    return correlation(roll_rate, -np.gradient(lateral, evidence.dt))
+
+
+def _squat(evidence: Evidence, mounting: Mounting) -> float:
+    """Correlation of the pitch rate with the rate of f_x.
+
+    A body that rises at its nose feels more force forward, uphill by gravity and under power by its squat.
+    """
+    along = mounting.force_in_car(evidence.force)[:, 0]
+    return correlation(mounting.rate_in_car(evidence.rate)[:, 1], np.gradient(along, evidence.dt))
 
 
 def _agreement(evidence: Evidence, mounting: Mounting) -> tuple[float, float]:
@@ -427,6 +473,8 @@ def _notes(
         if found < CLEAR and options.lateral_sign == "estimate":
             notes.append(f"too little {what} to check the sense of the lateral axis; taken as right-handed")
     standing = evidence.still.sum() * evidence.dt >= _STILL_S
+    if standing and rest_force(evidence)[1] == "average":
+        notes.append("the car stands on a slope: roll and pitch of the device are from the whole drive")
     if not standing and evidence.course is None and options.rate_bias_deg_s is None:
         notes.append("neither standstill nor course: the bias of the yaw rate is taken as zero")
     if rate_course is None and options.rate_sign == "estimate":
@@ -442,7 +490,11 @@ def _notes(
             "counter-clockwise, reverse its column instead"
         )
     elif rate_course is not None and abs(rate_course) < CLEAR and options.rate_sign == "estimate":
-        notes.append("the course does not show the sense of the rates; taken as it stands")
+        shown = abs(_squat(evidence, mounting)) >= CLEAR
+        notes.append(
+            "the course does not show the sense of the rates; "
+            + ("taken from the pitch of the body" if shown else "taken as it stands")
+        )
     return tuple(notes)
 
 

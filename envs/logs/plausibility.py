@@ -6,6 +6,7 @@ v r that of the yaw rate, and the course that of the yaw rate once more.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -15,7 +16,8 @@ import numpy as np
 from ..cues import GRAVITY, Floats
 from ..errors import DataError
 from .mounting import Evidence, Mounting, correlation, detrended, rest_force, turn, weightless
-from .signals import RATES, UNITS, ImportOptions
+from .signals import ImportOptions
+from .units import RATES, UNITS
 
 GRAVITY_TOLERANCE: Final = 0.5
 """Gravity as a device measures it may differ by so much from 9.81 or from the one given, m/s^2."""
@@ -167,6 +169,40 @@ def check_gravity(evidence: Evidence, options: ImportOptions) -> None:
         if likely
         else f"{said}; check units and columns of the force, or give gravity_m_s2 if the device counts so"
     )
+
+
+_PART_S: Final = 15.0
+_LARGEST_TILT: Final = math.radians(40.0)
+"""Parts of a drive, s, whose mean force may differ in direction by so much."""
+
+
+def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
+    """Refuse a device that turns in the car during the drive, or whose unit or axes change.
+
+    Raises:
+        DataError: with the time from the beginning of what is imported.
+    """
+    length = int(_PART_S / evidence.dt)
+    parts = [slice(first, first + length) for first in range(0, len(evidence.force) - length + 1, length)]
+    if options.slopes == "accept" or len(parts) < 2 or weightless(evidence.force):
+        return
+    means = np.array([evidence.force[part].mean(axis=0) for part in parts])
+    sizes = np.linalg.norm(means, axis=1)
+    for place in range(1, len(parts)):
+        when = f"at about {parts[place].start * evidence.dt:.0f} s of the import"
+        ratio = sizes[place] / sizes[place - 1]
+        if not 1.0 / SLOPE_TOLERANCE < ratio < SLOPE_TOLERANCE:
+            raise DataError(
+                f"gravity changes from {sizes[place - 1]:.3g} to {sizes[place]:.3g} m/s^2 {when}: the unit "
+                "of the force changes; leave one part out with start_s or end_s, or set slopes='accept'"
+            )
+        cosine = means[place] @ means[place - 1] / (sizes[place] * sizes[place - 1])
+        if cosine < math.cos(_LARGEST_TILT):
+            raise DataError(
+                f"the vertical tilts by {math.degrees(math.acos(cosine)):.0f} deg in the device's axes "
+                f"{when}: the device moved, or its axes change; leave one part out with start_s or end_s, or "
+                "set slopes='accept'"
+            )
 
 
 def check_fastest(evidence: Evidence, units: Mapping[str, str]) -> None:

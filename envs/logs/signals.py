@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -13,9 +11,10 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 from scipy.signal import butter, sosfiltfilt
 
-from ..cues import Floats, read_table
+from ..cues import Floats
 from ..errors import ConfigurationError, DataError, suggest
 from ..settings import NonNegative, Positive, Vector3, configuration
+from .units import FORCES, RATES, UNITS
 
 Sign = Literal["estimate", "keep", "flip"]
 
@@ -45,8 +44,19 @@ class ImportOptions:
     clock: Literal["refuse", "mend"] = "refuse"
     """Refuse a clock that wraps (a day, 32 bits of us), or mend it: unwrap its stamps."""
 
+    damage: Literal["refuse", "mend"] = "refuse"
+    """Refuse a damaged file (cut off, lines of another length, a header in the middle, rows that repeat),
+    or take what is whole."""
+
     spikes: Literal["refuse", "median"] = "refuse"
     """Refuse outliers of up to three samples, or replace them by the median of their neighbors."""
+
+    saturation: Literal["refuse", "accept"] = "refuse"
+    """Refuse a sensor that is cut off at its range, or accept what is left of its peaks."""
+
+    holds: Literal["keep", "thin"] = "keep"
+    """Keep values that are written again in each row until the sensor gives the next, or thin them out to the
+    rows with news, which removes their steps and half a period of delay."""
 
     longest_step_s: Positive = 0.2
     """A longer step between samples is a gap, s."""
@@ -79,6 +89,10 @@ class ImportOptions:
     """Whether the log has a force. From speed, it is dv/dt + omega x v with gravity, for rates about
     the car's own axes on a level road."""
 
+    rates: Literal["measured", "from-course", "from-force"] = "measured"
+    """Whether the log has angular rates. From course, the yaw rate is the rate of the course; from force, it
+    is f_y / v of a device whose axes are those of the car. Roll and pitch rates are then zero."""
+
     gravity: Literal["measured", "add"] = "measured"
     """Whether the force contains gravity. If it is to be added, roll and pitch are those given, or zero."""
 
@@ -102,32 +116,14 @@ class ImportOptions:
         return cutoff_hz
 
 
-FORCES: Final = ("force_x", "force_y", "force_z")
-"""Specific force along the axes of the device."""
-
-RATES: Final = ("rate_x", "rate_y", "rate_z")
-"""Angular velocity about the axes of the device."""
-
-_FORCE_UNITS: Final = {"m/s2": 1.0, "g": 9.80665}
-_RATE_UNITS: Final = {"rad/s": 1.0, "deg/s": math.radians(1.0)}
-
-UNITS: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "hhmmss": 1.0},
-    **dict.fromkeys(FORCES, _FORCE_UNITS),
-    **dict.fromkeys(RATES, _RATE_UNITS),
-    "speed": {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704},
-    "course": {"rad": 1.0, "deg": math.radians(1.0)},
-}
-"""Signals an import knows, each with its units and their SI values; the first unit is the default."""
-
-_NO_SPEED: Final = -1.0
-"""What receivers without a fix give for the speed, where it is the only negative value."""
-
 RECEIVED: Final = ("speed", "course")
 """Signals of a receiver, which may have a lower rate than the rows of the log."""
 
 _SPARSE: Final = 0.6
 """A signal with a smaller share of filled cells has a rate of its own."""
+
+_THINNED: Final = 0.4
+"""So has another signal whose values were thinned out."""
 
 _SPARSE_STEPS: Final = 2.5
 """Such a signal has a gap where a step exceeds so many of its median steps."""
@@ -146,6 +142,8 @@ class RawLog:
         rows: (n,) number of each data row in the file, from 1, for messages.
         time_unit: Of the time column, for messages.
         first_stamp_s: First stamp as the log counts it, s.
+        clock: Name of the topic, group or file whose stamps these are, where a recording has several.
+        no_values: By signal, the number that stands for an empty cell, its first row and its count.
     """
 
     time: Floats
@@ -153,6 +151,8 @@ class RawLog:
     rows: NDArray[np.intp]
     time_unit: str = "s"
     first_stamp_s: float = 0.0
+    clock: str = ""
+    no_values: Mapping[str, tuple[float, int, int]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]
         signal, equals, column = text.partition("=")
         if not equals or not column:
             raise ConfigurationError(f"column {text!r}: expected signal=column or signal=column:unit")
-        _check_signal(signal)
+        check_signal(signal)
         if signal in columns:
             raise ConfigurationError(f"column {signal!r} is given twice; name it once")
         name, colon, unit = column.rpartition(":")
@@ -194,107 +194,16 @@ def parse_columns(texts: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]
     return columns, units
 
 
-def read_log(
-    path: str | Path,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    required: tuple[str, ...] = REQUIRED,
-) -> RawLog:
-    """Read the named columns of a CSV file and convert them to SI units.
-
-    Args:
-        path: A CSV file with a header row; ``.csv.gz`` is unpacked.
-        columns: Column of each signal. A leading ``-`` reverses it; a number instead of a
-            column stands for a constant, in the same unit.
-        units: Unit of each signal; SI where none is given.
-        required: Signals that need a column.
-
-    Raises:
-        ConfigurationError: a signal or unit is unknown, or a required signal has no column.
-        DataError: the file cannot be read, or a column is missing or holds text.
-    """
-    factors = _factors(columns, units, required)
-    table = read_table(path, sorted({_bare(c) for c in columns.values() if _constant(c) is None}))
-    n = len(next(iter(table.values())))
-
-    def signal(name: str) -> Floats:
-        column = columns[name]
-        constant = _constant(column)
-        values = table[_bare(column)] if constant is None else np.full(n, constant)
-        negative = values < 0.0
-        if name == "speed" and np.all(values[negative] == _NO_SPEED):
-            values = np.where(negative, np.nan, values)
-        return values * (-factors[name] if constant is None and column.startswith("-") else factors[name])
-
-    stamps = table[_bare(columns["time"])]
-    if not np.any(np.isfinite(stamps)):
-        raise DataError(f"{path}: column {columns['time']} holds no time stamp")
-    if units.get("time") == "hhmmss":
-        stamps = _seconds_of_day(stamps, str(path))
-    # Subtracting before scaling keeps the digits of stamps counted from 1970.
-    first = float(stamps[np.isfinite(stamps)][0])
-    time = (stamps - first) * factors["time"]
-    signals = {name: signal(name) for name in columns if name != "time"}
-    return RawLog(time, signals, np.arange(1, n + 1), units.get("time", "s"), first * factors["time"])
-
-
-def _seconds_of_day(stamps: Floats, path: str) -> Floats:
-    """Seconds since midnight of clock times such as 95850.04, 9:58:50.04."""
-    hours, minutes, seconds = stamps // 1e4, stamps // 100.0 % 100.0, stamps % 100.0
-    wrong = np.flatnonzero((hours >= 24.0) | (minutes >= 60.0) | (seconds >= 60.0) | (stamps < 0.0))
-    if len(wrong):
-        raise DataError(
-            f"{path}: the time {stamps[wrong[0]]:.10g} at data row {wrong[0] + 1} is no HHMMSS; declare "
-            "another unit, time=COLUMN:s"
-        )
-    return np.asarray(hours * 3600.0 + minutes * 60.0 + seconds)
-
-
-def _factors(
-    columns: Mapping[str, str], units: Mapping[str, str], required: tuple[str, ...]
-) -> dict[str, float]:
-    for name in (*columns, *units):
-        _check_signal(name)
-    missing = [name for name in required if name not in columns]
-    if missing:
-        raise ConfigurationError(
-            f"no column for {', '.join(missing)}; name one with signal=column, or give a constant"
-        )
-    if _constant(columns["time"]) is not None or columns["time"].startswith("-"):
-        raise ConfigurationError(f"time={columns['time']}: time has to be a column as it stands")
-    return {name: _factor(name, units.get(name)) for name in columns}
-
-
-def _factor(signal: str, unit: str | None) -> float:
-    known = UNITS[signal]
-    if unit is None:
-        return next(iter(known.values()))
-    if unit not in known:
-        raise ConfigurationError(f"unit {unit!r} of {signal} is unknown; use {' or '.join(known)}")
-    return known[unit]
-
-
-def _check_signal(signal: str) -> None:
+def check_signal(signal: str) -> None:
+    """Refuse a signal that no import knows."""
     if signal not in UNITS:
         raise ConfigurationError(f"unknown signal {signal!r}. {suggest(signal, UNITS)}")
-
-
-def _bare(column: str) -> str:
-    return column.removeprefix("-")
-
-
-def _constant(column: str) -> float | None:
-    try:
-        value = float(column)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
 
 
 _FILTER_ORDER: Final = 2
 """Butterworth order of one pass; forwards and backwards doubles it."""
 
-_USUAL_STEP_S: Final = (5e-4, 0.5)
+USUAL_STEP_S: Final = (5e-4, 0.5)
 """Steps of the logs that devices in cars write; others have probably another unit."""
 
 _SHORTEST_S: Final = 1.0
@@ -333,12 +242,22 @@ def close_gaps(log: RawLog, options: ImportOptions) -> tuple[dict[str, Series], 
     """
     keep = _kept_rows(log, options)
     rows, time = log.rows[keep], log.time[keep]
+    for name, (number, row, count) in log.no_values.items():
+        if options.gaps == "refuse":
+            raise DataError(
+                f"{name} is {number:.6g} at data row {row} ({count} in all), which stands for no value; set "
+                "gaps='bridge', or mend the log"
+            )
     series = {
         name: _without_holes(name, (time, values[keep]), rows, options)
         for name, values in log.signals.items()
     }
     likely = _likely_unit(time, log.time_unit, log.first_stamp_s)
-    sparse = [name for name, values in log.signals.items() if _sparse(name, np.isfinite(values[keep]))]
+    # A receiver with a clock of its own has a rate of its own, too.
+    received = bool(log.clock) and all(name in RECEIVED for name in log.signals)
+    sparse = [
+        name for name, values in log.signals.items() if received or _sparse(name, np.isfinite(values[keep]))
+    ]
     bridged = sum(
         _bridge(name, stamps, options, likely, name in sparse) for name, (stamps, _) in series.items()
     )
@@ -385,7 +304,7 @@ def _without_holes(name: str, series: Series, rows: NDArray[np.intp], options: I
 
 def _sparse(name: str, known: NDArray[np.bool_]) -> bool:
     """Whether a signal comes at a rate of its own, as a receiver's does, and leaves other cells empty."""
-    return name in RECEIVED and bool(known.mean() < _SPARSE)
+    return bool(known.mean() < (_SPARSE if name in RECEIVED else _THINNED))
 
 
 def _likely_unit(time: Floats, unit: str, first: float) -> str:
@@ -393,9 +312,9 @@ def _likely_unit(time: Floats, unit: str, first: float) -> str:
     if len(time) < 2:
         return ""
     step, known = float(np.median(np.diff(time))), UNITS["time"]
-    if unit == "s" and _clock_time(time + first, step):
+    if unit == "s" and looks_like_clock_time(time + first):
         return ": the time looks like HHMMSS, which jumps at each minute; declare time=COLUMN:hhmmss"
-    least, most = _USUAL_STEP_S
+    least, most = USUAL_STEP_S
     if least <= step <= most:
         return ""
     likely = [one for one, factor in known.items() if least <= step / known[unit] * factor <= most]
@@ -403,9 +322,13 @@ def _likely_unit(time: Floats, unit: str, first: float) -> str:
     return f"{said} It looks like {likely[0]} (time=COLUMN:{likely[0]})" if likely else said
 
 
-def _clock_time(stamps: Floats, step: float) -> bool:
-    """Whether each stamp (n,) reads as HHMMSS, and each minute and hour that ends makes the jump of that."""
+def looks_like_clock_time(stamps: Floats) -> bool:
+    """Whether stamps (n,) read as HHMMSS, and each minute and hour that ends makes the jump of that."""
+    stamps = stamps[np.isfinite(stamps)]
     steps = np.diff(stamps)
+    if not np.any(steps > 0.0):
+        return False
+    step = float(np.median(steps))
     jumps = np.abs((steps + 0.5) % 100.0 - 40.5) <= 2.0 * step + 0.5
     return bool(
         step < 10.0
