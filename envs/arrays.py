@@ -47,6 +47,7 @@ FLOAT: Final[type[np.floating[Any]]] = np.float64 if _NAME == "double" else np.f
 vec2: Any = wp.types.vector(2, real)
 vec3: Any = wp.types.vector(3, real)
 vec6: Any = wp.types.vector(6, real)
+vec7: Any = wp.types.vector(7, real)
 vec9: Any = wp.types.vector(9, real)
 vec9i: Any = wp.types.vector(9, int)
 mat22: Any = wp.types.matrix((2, 2), real)
