@@ -32,10 +32,11 @@ def moved(rng: np.random.Generator) -> Platform:
 
 
 def nearly_alike(rng: np.random.Generator) -> Platform:
-    """The paper's machine, its lower platform the upper one but for some percent: legs nearly parallel."""
+    """The paper's machine, its lower platform drawn towards the upper one, where legs meet in a point."""
     base = get_platform("paper")
-    upper = np.array(base.hexapod.upper_joints)
-    return _with_joints(base, upper, upper * rng.uniform(0.8, 1.2) + rng.normal(0.0, 0.03, (6, 3)))
+    upper, lower = (np.array(joints) for joints in (base.hexapod.upper_joints, base.hexapod.lower_joints))
+    share = rng.uniform(0.5, 1.0)
+    return _with_joints(base, upper, (1.0 - share) * lower + share * rng.uniform(0.9, 1.1) * upper)
 
 
 def paired(rng: np.random.Generator) -> Platform:
@@ -78,11 +79,11 @@ KINDS = (moved, nearly_alike, paired, distorted)
 
 
 def accepted_machines(count: int, rng: np.random.Generator) -> list[Platform]:
-    """Machines of all kinds in turn that the package takes."""
+    """Machines of all kinds that the package takes."""
     found: list[Platform] = []
     while len(found) < count:
         try:
-            machine = KINDS[len(found) % len(KINDS)](rng)
+            machine = KINDS[rng.integers(len(KINDS))](rng)
             check_geometry(machine.hexapod)
         except ConfigurationError:
             continue
