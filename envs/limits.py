@@ -13,6 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Hashable
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, Final
 
 import numpy as np
@@ -236,10 +237,10 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
         raise
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None
-    except (EOFError, ValueError, NotImplementedError, RuntimeError, MemoryError) as error:
+    except (EOFError, ValueError, OverflowError, RuntimeError, MemoryError) as error:
         raise DataError(f"{path}: broken or cut off ({reason(error)})") from None
-    except (zipfile.BadZipFile, zlib.error, SyntaxError, TypeError) as error:
-        raise DataError(f"{path}: no .npz file, or broken ({error})") from None
+    except (zipfile.BadZipFile, zlib.error, SyntaxError, TypeError, KeyError, TokenError):
+        raise DataError(f"{path}: no .npz file, or broken") from None
 
 
 def _array(path: str | Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
