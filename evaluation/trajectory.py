@@ -231,7 +231,7 @@ class Trajectory:
             about = parse_json(str(content.pop("about")))
             if about["schema"] not in (1, SCHEMA):
                 raise DataError(
-                    f"{path}: trajectory of version {about['schema']}, this package reads 1 to {SCHEMA}"
+                    f"{path}: trajectory of version {str(about['schema'])[:20]!r}, this package reads 1 to {SCHEMA}"
                 )
             for name, old in _OLD_NAMES.items():
                 if old in content:
@@ -259,7 +259,10 @@ def _read(path: str | Path) -> dict[str, Any]:
 def _checked(label: str, name: str, values: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     kind = np.uint8 if name == "limits_active" else np.float64
     try:
-        array = np.array(values, dtype=kind)
+        found = np.asarray(values)
+        if found.dtype.kind not in "biuf":
+            raise TypeError
+        array = np.array(found, dtype=kind)
     except (TypeError, ValueError, OverflowError):
         raise DataError(f"trajectory {label}: {name} is not an array of numbers") from None
     if array.shape != shape:
