@@ -231,7 +231,7 @@ class Trajectory:
             about = parse_json(str(content.pop("about")))
             if about["schema"] not in (1, SCHEMA):
                 raise DataError(
-                    f"{path}: trajectory of version {str(about['schema'])[:20]!r}, this package reads 1 to {SCHEMA}"
+                    f"{path}: trajectory of version {about['schema']!r:.20}, this package reads 1 to {SCHEMA}"
                 )
             for name, old in _OLD_NAMES.items():
                 if old in content:

@@ -12,6 +12,7 @@ import json
 import random
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -166,9 +167,9 @@ def _changed_trajectory(rng: random.Random, path: Path) -> None:
         case 0:
             del arrays[name]
         case 1:
-            arrays[name] = arrays[name].astype(
-                rng.choice(["U3", "c16", "f2", "M8[s]", "?"]), casting="unsafe"
-            )
+            with suppress(ValueError), np.errstate(all="ignore"):
+                kind = rng.choice(["U3", "c16", "f2", "M8[s]", "?"])
+                arrays[name] = arrays[name].astype(kind, casting="unsafe")
         case 2:
             arrays[name] = np.atleast_1d(arrays[name])[:-1]
         case _:
