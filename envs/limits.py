@@ -240,7 +240,9 @@ def read_arrays(path: str | Path) -> dict[str, NDArray[Any]]:
     except (EOFError, ValueError, OverflowError, RuntimeError, MemoryError) as error:
         raise DataError(f"{path}: broken or cut off ({reason(error)})") from None
     except (zipfile.BadZipFile, zlib.error, SyntaxError, TypeError, KeyError, TokenError):
-        raise DataError(f"{path}: no .npz file, or broken") from None
+        with open(path, "rb") as file:
+            alone = file.read(6) == b"\x93NUMPY"
+        raise DataError(f"{path}: {'one array, ' if alone else ''}no .npz file, or broken") from None
 
 
 def _array(path: str | Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
