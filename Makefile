@@ -1,5 +1,7 @@
 # Set-up, checks and evaluation. `make help` lists the targets.
 # Everything is installed into $(VENV), with the versions of constraints.txt.
+# There are no hashes in it: pip demands one of every requirement then, and has none of a folder or of
+# `-e .`, so the two commands could not install this package itself (--require-hashes refuses it).
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -23,7 +25,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: help evaluate paper test test-fast coverage lint types unit format bench docs docs-serve constraints clean distclean
+.PHONY: help evaluate paper test test-fast coverage lint types unit format bench docs docs-serve audit wheel constraints clean distclean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -73,6 +75,23 @@ docs: $(DOCS) $(TYPES)/motion_cueing ## Build the documentation into build/site;
 docs-serve: $(DOCS) $(TYPES)/motion_cueing ## Show the documentation at http://localhost:8000, and again at every change
 	@PYTHONPATH=$(TYPES) $(BIN)/python docs/generate.py
 	@PYTHONPATH= $(BIN)/zensical serve
+
+# The audit's tool lives apart, so that what it needs is not among what it looks at.
+audit: ## Look up known vulnerabilities of constraints.txt, and write build/sbom.json (CycloneDX)
+	@mkdir -p build
+	@test -x build/audit/bin/pip-audit || { $(PYTHON) -m venv build/audit && \
+		build/audit/bin/python -m pip install -qq --disable-pip-version-check pip-audit; }
+	build/audit/bin/pip-audit --requirement constraints.txt --no-deps --disable-pip \
+		--format cyclonedx-json --output build/sbom.json
+
+# Dates in the wheel are those of the last commit, so whoever builds it gets the same bytes.
+wheel: $(DEV) ## Build the wheel twice into dist, and compare the two
+	@rm -rf dist build/wheel build/again && mkdir -p build
+	@for folder in dist build/again; do \
+		rm -rf build/source && mkdir -p build/source && git archive HEAD | tar x -C build/source && \
+		SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m pip wheel -qq --no-deps \
+			--disable-pip-version-check --wheel-dir $$folder ./build/source || exit 1; done
+	@cmp dist/*.whl build/again/*.whl && sha256sum dist/*.whl
 
 constraints: $(DEV) ## Rewrite constraints.txt for the requirements in pyproject.toml; UPGRADE=1 for newer versions
 	$(BIN)/python -m pip install -qq --disable-pip-version-check uv

@@ -32,7 +32,7 @@ from ..envs.cues import GRAVITY
 from ..envs.errors import ConfigurationError
 from ..envs.platform import Hexapod, Platform, actuator_limits
 from ..envs.simulator.simulator import N_AXES
-from ..envs.storage import cache_folder, write_bytes, write_text
+from ..envs.storage import cache_folder, is_private, private_folder, write_bytes, write_text
 
 try:
     import casadi
@@ -285,8 +285,8 @@ def compiled(function: Any) -> Any:
     generator.add(function)
     source = generator.dump()
     key = hashlib.sha256("\n".join((*_FLAGS, compiler, platform.platform(), source)).encode()).hexdigest()
-    library = cache_folder() / f"{function.name()}-{key}.so"
     try:
+        library = _code_folder() / f"{function.name()}-{key}.so"
         if not _is_intact(library):
             code = _compile(compiler, source)
             write_bytes(library, code)
@@ -296,14 +296,21 @@ def compiled(function: Any) -> Any:
         return function
 
 
+def _code_folder() -> Path:
+    """The cache where the user alone can write it, else a private folder: code from there is executed."""
+    folder = cache_folder()
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return folder if is_private(folder) else private_folder()
+
+
 def _seal(library: Path) -> Path:
     """The file with the library's own hash."""
     return library.with_suffix(".sha256")
 
 
 def _is_intact(library: Path) -> bool:
-    """Whether a library exists undamaged: loading a damaged one would end the process."""
-    if not (library.exists() and _seal(library).exists()):
+    """Whether a library of the user exists undamaged: loading a damaged one would end the process."""
+    if not (is_private(library) and is_private(_seal(library))):
         return False
     return hashlib.sha256(library.read_bytes()).hexdigest() == _seal(library).read_text(encoding="utf-8")
 

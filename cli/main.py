@@ -17,6 +17,7 @@ from inspect import cleandoc
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from ..envs.errors import ConfigurationError, MotionCueingError, look_up
+from ..envs.storage import release_folders
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -254,6 +255,8 @@ def _guarded(program: str, work: Callable[[], int], interrupted: str) -> int:
         return FAILURE
     except OSError as error:
         return _complain(program, f"{error.filename or 'output'}: {error.strerror or error}", FAILURE)
+    finally:
+        release_folders()
 
 
 def _complain(program: str, message: str, status: int) -> int:

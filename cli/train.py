@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from ..envs.errors import ConfigurationError, DataError
+from ..envs.storage import check_folder
 from .arguments import Fresh, Whole, Workers, named, option, several
 
 if TYPE_CHECKING:
@@ -279,6 +280,8 @@ def goes_on(command: TrainingOptions, kind: str) -> bool:
         raise DataError(
             f"--out {out} holds a {begun}; {_COMMAND[begun]} goes on with it; or name another folder"
         )
+    # Not while another process trains there.
+    check_folder("--out", out)
     if command.fresh:
         shutil.rmtree(out)
     return not command.fresh

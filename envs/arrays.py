@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -15,11 +16,31 @@ import warp as wp
 from numpy.typing import NDArray
 
 from .errors import ConfigurationError
+from .storage import writable_cache
+
+
+def _usual_kernel_cache() -> str:
+    """Where Warp keeps compiled kernels by default."""
+    try:
+        from warp._src.build import appdirs  # type: ignore[attr-defined,unused-ignore]
+
+        return str(appdirs.user_cache_dir(appname="warp", appauthor="NVIDIA", version=wp.config.version))
+    except (ImportError, AttributeError):
+        return str(Path.home() / ".cache" / "warp" / wp.__version__)
 
 
 def _initialize_quietly() -> None:
-    """Start Warp without its greeting and its native warning on a machine that has no GPU."""
+    """Start Warp without its greeting and its native warning on a machine that has no GPU.
+
+    Where its cache of kernels cannot be written, it gets a temporary one.
+    """
     wp.config.log_level = wp.LOG_ERROR
+    usual = wp.config.kernel_cache_dir or os.environ.get("WARP_CACHE_PATH") or _usual_kernel_cache()
+    cache = writable_cache(Path(usual), "WARP_CACHE_PATH")
+    if str(cache) != usual:
+        wp.config.kernel_cache_dir = str(cache)
+        # Workers say nothing again.
+        os.environ["WARP_CACHE_PATH"] = str(cache)
     sys.stderr.flush()
     saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -47,6 +68,7 @@ FLOAT: Final[type[np.floating[Any]]] = np.float64 if _NAME == "double" else np.f
 vec2: Any = wp.types.vector(2, real)
 vec3: Any = wp.types.vector(3, real)
 vec6: Any = wp.types.vector(6, real)
+vec7: Any = wp.types.vector(7, real)
 vec9: Any = wp.types.vector(9, real)
 vec9i: Any = wp.types.vector(9, int)
 mat22: Any = wp.types.matrix((2, 2), real)

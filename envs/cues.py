@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DataError, reason
+from .limits import MOST_CELLS, MOST_COLUMNS, read_table_text
 from .storage import write_bytes, write_text
 
 Floats = NDArray[np.float64]
@@ -242,10 +243,17 @@ def read_table(path: str | Path, columns: list[str] | None = None) -> dict[str, 
 def _read_rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Header and rows of a CSV file, all of one length, each row with its line counted from 1."""
     try:
-        content = Path(path).read_bytes()
-        text = (gzip.decompress(content) if str(path).endswith(".gz") else content).decode("utf-8-sig")
-        reader = csv.reader(io.StringIO(text, newline=""))
-        rows = [(reader.line_num, row) for row in reader if row]
+        reader = csv.reader(io.StringIO(read_table_text(path), newline=""))
+        rows, cells = [], 0
+        for row in filter(None, reader):
+            rows.append((reader.line_num, row))
+            cells += len(row)
+            if len(row) > MOST_COLUMNS:
+                raise DataError(
+                    f"{path}: line {reader.line_num} has {len(row)} cells, at most {MOST_COLUMNS} are read"
+                )
+            if cells > MOST_CELLS:
+                raise DataError(f"{path}: more than {MOST_CELLS} cells; split the file, or leave columns out")
     except (OSError, EOFError, zlib.error, csv.Error, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     if len(rows) < 2:

@@ -18,6 +18,7 @@ from pydantic.dataclasses import dataclass
 from typing_extensions import dataclass_transform
 
 from .errors import ConfigurationError, DataError, UnknownNameError, reason, suggest
+from .limits import LARGEST_TEXT, parse_yaml, read_bytes
 from .storage import write_text
 
 _STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=True)
@@ -174,8 +175,8 @@ def read_yaml(path: str | Path) -> object:
         DataError: the file cannot be read or is not YAML.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-        return yaml.safe_load(text)
+        text = read_bytes(path, LARGEST_TEXT).decode("utf-8")
+        return parse_yaml(text)
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     except yaml.YAMLError as error:

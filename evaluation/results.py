@@ -17,6 +17,7 @@ from pydantic import JsonValue
 from typing_extensions import Self
 
 from ..envs.errors import DataError, reason
+from ..envs.limits import LARGEST_RESULTS, parse_json, read_bytes
 from ..envs.provenance import now, package_version, plain, versions
 from ..envs.settings import configuration, from_dict, renamed, to_dict
 from ..envs.storage import write_text
@@ -56,8 +57,8 @@ class Saved:
             ConfigurationError: a field is missing, unknown or wrong.
         """
         try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            values = parse_json(read_bytes(path, LARGEST_RESULTS).decode("utf-8"))
+        except (OSError, ValueError) as error:
             raise DataError(f"{path}: cannot be read as {cls.what} ({reason(error)})") from None
         schema = values.get("schema") if isinstance(values, dict) else None
         oldest = cls.version if cls.oldest is None else cls.oldest
@@ -111,7 +112,7 @@ def load_drives_done(kind: type[T], path: Path, of: str) -> T:
         of: What the drives belong to, for messages.
     """
     try:
-        return from_dict(kind, json.loads(path.read_text(encoding="utf-8")), str(path))
+        return from_dict(kind, parse_json(read_bytes(path, LARGEST_RESULTS)), str(path))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from None
     except ValueError:

@@ -23,6 +23,7 @@ from ..envs.cues import CueTrace
 from ..envs.errors import ActionError, ConfigurationError, MotionCueingError, PolicyError, place, summary
 from ..envs.perception import VestibularModel, get_vestibular_model
 from ..envs.platform import Platform, actuator_limits, get_platform
+from ..envs.platform.kernels.step import HELD
 from ..envs.settings import to_dict
 from ..envs.simulator.simulator import N_AXES, TIME_STEP
 from .trajectory import LimitTable, Trajectory
@@ -238,8 +239,15 @@ def trajectory_of(recording: Recording, run: Rollout, car: Car | None = None) ->
             "vestibular": run.simulator.vestibular.name,
             "source": cues.source,
             **policy.statistics,
+            **emergency_stops(states["limits"]),
         },
     )
+
+
+def emergency_stops(limits: NDArray[np.uint64]) -> dict[str, str]:
+    """The number of steps (n,) in which the pose was held, where there are any; counted with the policy's."""
+    count = int(np.count_nonzero(limits & np.uint64(HELD)))
+    return {"emergency stops of the hexapod": str(count)} if count else {}
 
 
 def statistics_of(metadata: Mapping[str, str]) -> dict[str, str]:

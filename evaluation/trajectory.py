@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..envs.errors import DataError, reason
+from ..envs.errors import DataError
+from ..envs.limits import parse_json, read_arrays
 from ..envs.platform.kernels import ACTUATORS
 from ..envs.storage import write_bytes
 
@@ -229,10 +228,10 @@ class Trajectory:
         """
         content = _read(path)
         try:
-            about = json.loads(str(content.pop("about")))
+            about = parse_json(str(content.pop("about")))
             if about["schema"] not in (1, SCHEMA):
                 raise DataError(
-                    f"{path}: trajectory of version {about['schema']}, this package reads 1 to {SCHEMA}"
+                    f"{path}: trajectory of version {about['schema']!r:.20}, this package reads 1 to {SCHEMA}"
                 )
             for name, old in _OLD_NAMES.items():
                 if old in content:
@@ -240,33 +239,30 @@ class Trajectory:
             limits = LimitTable(**{name: content.pop(f"limit_{name}") for name in _LIMITS})
             names: dict[str, Any] = {name: str(about[name]) for name in _NAMES}
             columns: dict[str, Any] = {name: content[name] for name in _COLUMNS}
-            return cls(**names, **columns, limits=limits, metadata=about["metadata"])
-        except (KeyError, TypeError, json.JSONDecodeError) as error:
+            metadata = {str(name): str(text) for name, text in about["metadata"].items()}
+            return cls(**names, **columns, limits=limits, metadata=metadata)
+        except DataError:
+            raise
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise DataError(f"{path}: not a saved trajectory, or broken ({error})") from None
 
 
 def _read(path: str | Path) -> dict[str, Any]:
     try:
-        file = np.load(path, allow_pickle=False)
-        if isinstance(file, np.ndarray):
-            raise DataError(f"{path}: one array, not a saved trajectory")
-        with file:
-            return {name: file[name] for name in file.files}
-    except DataError:
-        raise
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read as a trajectory ({reason(error)})") from None
-    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+        return dict(read_arrays(path))
+    except DataError as error:
         raise DataError(
-            f"{path}: not a saved trajectory, or broken; give a .npz file that an evaluation or "
-            "`motion-cueing serve --log` wrote"
+            f"{error}; give a .npz file that an evaluation or `motion-cueing serve --log` wrote"
         ) from None
 
 
 def _checked(label: str, name: str, values: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     kind = np.uint8 if name == "limits_active" else np.float64
     try:
-        array = np.array(values, dtype=kind)
+        found = np.asarray(values)
+        if found.dtype.kind not in "biuf":
+            raise TypeError
+        array = np.array(found, dtype=kind)
     except (TypeError, ValueError, OverflowError):
         raise DataError(f"trajectory {label}: {name} is not an array of numbers") from None
     if array.shape != shape:

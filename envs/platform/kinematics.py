@@ -7,6 +7,7 @@ l = L_IH A - B + S_0 + s, Eq. (12); its length changes at l . (ds/dt + omega x L
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,6 +20,32 @@ Floats = NDArray[np.float64]
 
 NEARLY_SINGULAR: Final = 0.15
 """Clearance (share of neutral's det(J)) below which the platform is not let come to rest."""
+
+FAR_FROM_SINGULAR: Final = 0.75
+"""Clearance from which braking may be taken not to lead to a singular pose, if sampling says so."""
+
+NEIGHBORHOOD: Final = 0.35
+"""Largest difference of an Euler angle between neighboring poses, rad; more means a singular pose between."""
+
+_STEP: Final = 0.01
+"""Time step at which a geometry must stay clear of singular poses, s."""
+
+_CORNERS: Final = np.array(list(product((-1.0, 1.0), repeat=6)))
+"""Every combination of the ways that six legs go."""
+
+_DIRECTIONS: Final = np.random.default_rng(0).normal(size=(12, 6))
+_WAYS: Final = np.vstack(
+    [np.eye(6), -np.eye(6), _DIRECTIONS / np.abs(_DIRECTIONS).max(axis=1, keepdims=True)]
+)
+_SHARES: Final = np.linspace(0.0, 1.0, 6)
+_WORST: Final = 24
+"""Directions in which poses are looked at, shares of the reach, and from how many of them legs brake."""
+
+_DIFFERENCE: Final = 1e-6
+"""Step of a difference quotient, m and rad."""
+
+_LOOK_ITERATIONS: Final = 8
+"""Newton's iterations of a look; a pose that needs more is not near."""
 
 _LEAST_CONDITION: Final = 1e-3
 """Least ratio of the neutral Jacobian's singular values (lengths over the joint radius)."""
@@ -160,8 +187,8 @@ def check_geometry(hexapod: Hexapod) -> None:
     """Refuse a hexapod that does not hold its platform at neutral.
 
     Raises:
-        GeometryError: the platform is below its base, or the Jacobian at neutral is singular: legs are
-            parallel or all meet one line.
+        GeometryError: the platform is below its base; or the Jacobian at neutral is singular, as legs are
+            parallel or all meet one line; or legs at full speed lead to a singular pose within a time step.
     """
     radius = float(np.mean(np.linalg.norm(hexapod.upper_joints, axis=1)))
     if radius == 0.0:
@@ -183,6 +210,75 @@ def check_geometry(hexapod: Hexapod) -> None:
             f"{values[-1] / values[0]:.1e}): move upper_joints, lower_joints or neutral so that the legs "
             "are not parallel and do not all meet one line"
         )
+    if not _is_clear_for_a_step(hexapod):
+        raise GeometryError(
+            f"the hexapod reaches a singular pose within {_STEP:g} s of neutral when its legs move at "
+            f"{hexapod.velocity:g} m/s, so no limit keeps it away: move upper_joints, lower_joints or "
+            "neutral so that the legs lie less alike, or lower hexapod.velocity"
+        )
+
+
+def _clearances(hexapod: Hexapod, pose: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of poses (n, 6): extensions (n, 6), their derivative by the pose (n, 6, 6), and the clearance (n,)."""
+    arms, legs = leg_vectors(hexapod, pose)
+    jacobian = leg_jacobian(arms, legs)
+    clearance = np.linalg.det(jacobian) / np.linalg.det(neutral_jacobian(hexapod))
+    jacobian[..., 3:] = jacobian[..., 3:] @ turning_axes(pose[..., 3:])
+    return np.linalg.norm(legs, axis=-1) - hexapod.neutral_lengths, jacobian, clearance
+
+
+def _clearance_after(hexapod: Hexapod, start: Floats, way: Floats) -> Floats:
+    """(n,) clearance after legs go a way (n, 6) from poses (n, 6); minus infinity where none near closes."""
+    pose = start
+    extensions, jacobian, clearance = _clearances(hexapod, pose)
+    target = extensions + way
+    # What does not close runs away; it is told by its error.
+    with np.errstate(all="ignore"):
+        for _ in range(_LOOK_ITERATIONS):
+            try:
+                pose = pose + np.linalg.solve(jacobian, (target - extensions)[..., None])[..., 0]
+            except np.linalg.LinAlgError:
+                return np.full(len(start), -np.inf)
+            extensions, jacobian, clearance = _clearances(hexapod, pose)
+            error = np.abs(extensions - target).max(axis=1)
+            if error.max() <= _CLOSED:
+                break
+    near = np.abs(pose - start)[:, 3:].max(axis=1) <= NEIGHBORHOOD
+    return np.where((error <= _CLOSED) & near, clearance, -np.inf)
+
+
+@lru_cache(maxsize=4096)
+def _is_clear_for_a_step(hexapod: Hexapod) -> bool:
+    """Whether legs at full speed, in every combination of ways, are at clear poses after a time step."""
+    step = hexapod.velocity * _STEP
+    way = np.clip(step * _CORNERS, *hexapod.extension)
+    return bool(_clearance_after(hexapod, np.zeros_like(way), way).min() >= NEARLY_SINGULAR)
+
+
+@lru_cache(maxsize=4096)
+def braking_stays_clear(hexapod: Hexapod) -> bool:
+    """Whether legs that brake in poses far from singular ones come to rest clear of them: by sampling.
+
+    Poses lie on straight ways from neutral. From those where it falls most, all legs go on for their braking
+    distance, each towards where the clearance falls, and there must be twice the clearance needed.
+    """
+    above = np.array(hexapod.upper_joints)
+    radius = float(np.linalg.norm(above - above.mean(axis=0), axis=1).mean())
+    span = 2.0 * max(-hexapod.extension[0], hexapod.extension[1])
+    reach = np.append([span] * 3, [min(span / radius, _LARGEST_ANGLE)] * 3)
+    poses = (_SHARES[:, None, None] * (_WAYS * reach)).reshape(-1, 6)
+    extensions, jacobian, clearance = _clearances(hexapod, poses)
+    within = (extensions >= hexapod.extension[0]) & (extensions <= hexapod.extension[1])
+    chosen = within.all(axis=1) & (clearance >= FAR_FROM_SINGULAR)
+    poses, jacobian, clearance = poses[chosen], jacobian[chosen], clearance[chosen]
+    beside = poses[:, None, :] + _DIFFERENCE * np.eye(6)
+    slope = (_clearances(hexapod, beside)[2] - clearance[:, None]) / _DIFFERENCE
+    slope = np.linalg.solve(np.swapaxes(jacobian, -1, -2), slope[..., None])[..., 0]
+    # Whole time steps may take half a step longer than the parabola of braking.
+    stop = 0.5 * hexapod.velocity * (hexapod.velocity / hexapod.acceleration + _STEP)
+    worst = np.argsort(clearance - stop * np.abs(slope).sum(axis=1))[:_WORST]
+    after = _clearance_after(hexapod, poses[worst], -stop * np.sign(slope[worst]))
+    return bool(after.min() >= 2.0 * NEARLY_SINGULAR)
 
 
 _POSES: Final = 61

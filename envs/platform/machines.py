@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from ..errors import ConfigurationError
-from ..settings import NonNegative, Positive, Vector2, Vector3, configuration
+from ..settings import Positive, Vector2, Vector3, configuration
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -29,6 +29,10 @@ LOCKED: Final = 1.0
 """Velocity and acceleration limit of a missing subsystem, whose travel is zero."""
 
 
+LONGEST_DEAD_TIME: Final = 10.0
+"""s; each of its time steps takes memory."""
+
+
 @configuration
 class ActuatorDynamics:
     """Second-order lag and dead time of one subsystem.
@@ -41,7 +45,7 @@ class ActuatorDynamics:
 
     natural_frequency: Positive | None = None
     damping: Annotated[float, Field(ge=1.0)] = 1.0
-    dead_time: NonNegative = 0.0
+    dead_time: Annotated[float, Field(ge=0.0, le=LONGEST_DEAD_TIME)] = 0.0
 
 
 UNITY = ActuatorDynamics()

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from ..arrays import mat63, mat65, vec3, vec6, vec9
 from .kernels.geometry import HexapodGeometry
 from .kernels.step import Machine
-from .kinematics import check_geometry, neutral_jacobian
+from .kinematics import FAR_FROM_SINGULAR, braking_stays_clear, check_geometry, neutral_jacobian
 from .machines import ActuatorDynamics, Hexapod, Platform, limits_of
 
 
@@ -65,6 +65,7 @@ def machine_parameters(platform: Platform, dt: float) -> Any:
     machine: Any = Machine()
     machine.geometry = geometry_of(platform.hexapod)
     machine.neutral_determinant = float(np.linalg.det(neutral_jacobian(platform.hexapod)))
+    machine.far_from_singular = FAR_FROM_SINGULAR if braking_stays_clear(platform.hexapod) else np.inf
     for name, values in limits_of(platform).items():
         setattr(machine, name, vec9(*values))
     cab = np.array(platform.cab.reference_point)

@@ -11,16 +11,18 @@ from collections.abc import Mapping
 from dataclasses import field
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from ...baselines.mpc.parameters import MpcParameters
 from ...baselines.washout.families import AnyWashout, FamilyParameters
 from ...envs.errors import ConfigurationError, DataError
+from ...envs.limits import LARGEST_AGENT, MOST_LAYERS, check_size, parse_json
 from ...envs.platform.machines import Platform
 from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.storage import write_bytes
@@ -61,6 +63,7 @@ class Record:
 
 
 Arrays = dict[str, NDArray[Any]]
+Layers = Annotated[int, Field(ge=0, le=MOST_LAYERS)]
 
 _MEAN: Final = "observation.mean"
 _VARIANCE: Final = "observation.variance"
@@ -96,11 +99,11 @@ class Contents:
     squash: Squash
     skip: bool
     clip: Positive
-    layers: int
+    layers: Layers
     base: MpcParameters | AnyWashout | None = None
     bound: Positive = 1.0
     agent: Contents | None = None
-    memory: int = 0
+    memory: Layers = 0
 
 
 def contents_of(
@@ -251,6 +254,7 @@ def _check_kind(path: str | Path) -> None:
     try:
         with open(path, "rb") as file:
             head = file.read(LENGTH + 1)
+        check_size(path, LARGEST_AGENT)
     except FileNotFoundError:
         raise DataError(f"agent {path}: there is no such file") from None
     except OSError as error:
@@ -263,9 +267,9 @@ def _about(path: str | Path, metadata: Mapping[str, str] | None) -> dict[str, An
     if not metadata or METADATA not in metadata:
         raise _foreign(path)
     try:
-        about = json.loads(metadata[METADATA])
+        about = parse_json(metadata[METADATA])
         version = int(about["format"])
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         raise DataError(f"{path}: damaged, its description is no JSON; copy or download it again") from None
     if version > FORMAT:
         raise DataError(

@@ -12,6 +12,8 @@ METADATA: Final = "motion-cueing-agent"
 """Key of an agent's description in the metadata of its file."""
 LENGTH: Final = 8
 """Bytes of the header's length, before the header, which begins with a brace."""
+_LONGEST_HEADER: Final = 100_000_000
+"""Bytes of a header that safetensors reads."""
 
 
 def agent_names() -> list[str]:
@@ -40,7 +42,8 @@ def description_of(algorithm: str, any_machine: bool, platform: str, mode: str) 
 def description_in(path: Path) -> str:
     """The description of an agent in a file, from its header alone."""
     with open(path, "rb") as file:
-        header = json.loads(file.read(int.from_bytes(file.read(LENGTH), "little")))
+        length = int.from_bytes(file.read(LENGTH), "little")
+        header = json.loads(file.read(min(length, _LONGEST_HEADER)))
     about: dict[str, Any] = json.loads(header["__metadata__"][METADATA])["contents"]
     task = about["task"]
     return description_of(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from ...arrays import mat33, mat63, real, vec3, vec6
+from ...arrays import mat33, mat63, real, vec3, vec6, vec7
 from ...cues import GRAVITY
 
 
@@ -214,8 +214,11 @@ def platform_rates(jacobian: Jacobian, beta: vec3, rates: vec6) -> vec6:
 
 
 @wp.func
-def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3) -> vec6:
-    """Pose [s, beta] with these leg extensions, by Newton iteration from a neighboring pose."""
+def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3) -> vec7:
+    """Pose [s, beta] with these leg extensions, by Newton iteration from a neighboring pose.
+
+    Its last entry is the largest leg error left, m: the pose is one with these legs only where that is small.
+    """
     s = displacement
     b = beta
     error = extensions - leg_extensions(g, s, b)
@@ -226,14 +229,14 @@ def forward_kinematics(g: HexapodGeometry, extensions: vec6, displacement: vec3,
         b = b + vec3(step[3], step[4], step[5])
         error = extensions - leg_extensions(g, s, b)
         count = count + 1
-    return vec6(s[0], s[1], s[2], b[0], b[1], b[2])
+    return vec7(s[0], s[1], s[2], b[0], b[1], b[2], wp.max(wp.abs(error)))
 
 
 @wp.func_grad(forward_kinematics)
 def adjoint_forward_kinematics(
-    g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3, adjoint: vec6
+    g: HexapodGeometry, extensions: vec6, displacement: vec3, beta: vec3, adjoint: vec7
 ) -> None:
-    """Implicit function theorem: d pose / d extensions = J^-1; the first guess has no part."""
+    """Implicit function theorem: d pose / d extensions = J^-1; the first guess and the error have no part."""
     pose = forward_kinematics(g, extensions, displacement, beta)
     s = vec3(pose[0], pose[1], pose[2])
     b = vec3(pose[3], pose[4], pose[5])

@@ -4,7 +4,8 @@
 
 **Set-point.** Each step begins where limiting left it, so a command never winds up. Carriage and turntable
 are limited axis by axis. A hexapod command is followed exactly where every leg may; else each leg goes as
-far towards it as its limits allow, and the platform goes where forward kinematics says.
+far towards it as its limits allow, and the platform goes where forward kinematics says. Where that finds
+no pose, the platform holds its last one and the legs stop at once: an emergency stop, marked by :data:`HELD`.
 
 **Limits.** An actuator moves with constant acceleration over a step. Its state (q, v) is safe at an upper end
 q_max if it can stop before it with the acceleration limit A, in whole steps:
@@ -28,8 +29,8 @@ from typing import Final
 
 import warp as wp
 
-from ...arrays import mat65, real, vec2, vec3, vec6, vec9
-from ..kinematics import NEARLY_SINGULAR
+from ...arrays import mat65, real, vec2, vec3, vec6, vec7, vec9
+from ..kinematics import NEARLY_SINGULAR, NEIGHBORHOOD
 from ..machines import ACTUATORS as ACTUATORS
 from ..machines import AXES as AXES
 from .geometry import (
@@ -114,6 +115,14 @@ END_OF_TRAVEL: Final = 0x111111111
 SINGULAR: Final = 0x888888888
 """Bits that say a nearly singular pose."""
 
+CLOSES = wp.constant(real(1e-10 if real is wp.float64 else 1e-5))
+"""Largest leg error of a pose that closes, m."""
+
+HELD: Final = 1 << 36
+"""Bit that says an emergency stop: the legs have no pose near the last one, which is held."""
+
+_EMERGENCY_STOP: Final = HELD | 0x088888800
+
 
 @wp.struct
 class Machine:
@@ -121,6 +130,7 @@ class Machine:
 
     geometry: HexapodGeometry
     neutral_determinant: real  # det(J) at neutral
+    far_from_singular: real  # clearance from which braking leads to no singular pose; infinite where unknown
     position_min: vec9  # m, m, 6 x m, rad
     position_max: vec9
     velocity: vec9  # m/s, rad/s
@@ -158,7 +168,9 @@ class Step:
     """One step of the machine: where it came to, and what held it back."""
 
     motion: Motion
-    limits: wp.uint64  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose
+    limits: (
+        wp.uint64
+    )  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose; HELD
 
 
 @wp.func
@@ -195,13 +207,6 @@ def lag(
     return vec2(position, rate)
 
 
-FAR_FROM_SINGULAR = wp.constant(real(0.75))
-"""Clearance from which braking is taken not to lead to a singular pose."""
-
-NEIGHBORHOOD = wp.constant(real(0.35))
-"""Largest change of an Euler angle while the legs brake, rad; more means a singular pose between."""
-
-
 @wp.func
 def clearance(m: Machine, displacement: vec3, beta: vec3) -> real:
     """det(J) of a pose over that of neutral: 0 in a singular pose, negative behind it."""
@@ -209,17 +214,69 @@ def clearance(m: Machine, displacement: vec3, beta: vec3) -> real:
 
 
 @wp.func
-def is_clear(m: Machine, pose: vec6, extensions: vec6, beta: vec3, least: real) -> bool:
-    """Whether a pose has these legs, is a neighbor of the one with ``beta``, and not nearly singular.
+def is_clear(m: Machine, pose: vec7, beta: vec3, least: real) -> bool:
+    """Whether a pose of forward kinematics closes, is near one with ``beta``, and not nearly singular.
 
     Behind a singular pose Newton's iteration finds no pose, or one far off. Comparisons with NaN are false.
     """
     displacement = vec3(pose[0], pose[1], pose[2])
     angles = vec3(pose[3], pose[4], pose[5])
-    error = wp.max(wp.abs(leg_extensions(m.geometry, displacement, angles) - extensions))
-    closes = error <= real(10.0) * NEWTON_TOLERANCE
-    near = wp.max(wp.abs(angles - beta)) <= NEIGHBORHOOD
+    closes = pose[6] <= real(10.0) * NEWTON_TOLERANCE
+    near = wp.max(wp.abs(angles - beta)) <= real(wp.static(NEIGHBORHOOD))
     return closes and near and clearance(m, displacement, angles) >= least
+
+
+LOOKS = wp.constant(32)
+"""Most poses looked at while the legs of an odd geometry brake; all of them where these are steps enough."""
+
+
+@wp.func
+def braking_distance(rate: real, acceleration: real, steps: int, dt: real) -> real:
+    """How far an actuator that brakes with its limit goes within a number of whole steps, with its sign."""
+    speed = wp.abs(rate)
+    full = wp.min(steps, int(wp.floor(speed / (acceleration * dt))))
+    time = real(full) * dt
+    distance = (speed - real(0.5) * acceleration * time) * time
+    if steps > full:
+        # The last step takes what is left of the speed.
+        distance = distance + real(0.5) * (speed - acceleration * time) * dt
+    return wp.sign(rate) * distance
+
+
+@wp.func
+def brakes_clear(
+    m: Machine,
+    start: Motion,
+    displacement: vec3,
+    beta: vec3,
+    extensions: vec6,
+    rates: vec6,
+    least: real,
+    dt: real,
+) -> bool:
+    """:func:`keeps_clear` for geometries that may be singular near any pose: looks at each step of braking.
+
+    So what is clear now stays clear: the next step can always brake on along the poses seen here.
+    """
+    steps = int(0)
+    for i in range(6):
+        steps = wp.max(steps, int(wp.ceil(wp.abs(rates[i]) / (m.acceleration[i + 2] * dt))))
+    looks = wp.min(steps, LOOKS)
+    clear = bool(wp.max(wp.abs(beta - start.beta)) <= real(wp.static(NEIGHBORHOOD)))
+    at = displacement
+    angles = beta
+    look = int(0)
+    while clear and look < looks:
+        look = look + 1
+        legs = vec6()
+        for i in range(6):
+            way = braking_distance(rates[i], m.acceleration[i + 2], (look * steps) / looks, dt)
+            legs[i] = extensions[i] + way
+        pose = forward_kinematics(m.geometry, legs, at, angles)
+        clear = is_clear(m, pose, angles, least)
+        at = vec3(pose[0], pose[1], pose[2])
+        angles = vec3(pose[3], pose[4], pose[5])
+    return clear
 
 
 @wp.func
@@ -231,6 +288,7 @@ def keeps_clear(
     beta: vec3,
     extensions: vec6,
     rates: vec6,
+    dt: real,
 ) -> bool:
     """Whether the platform, braking from a pose with this Jacobian, comes to rest clear of singular poses.
 
@@ -238,11 +296,13 @@ def keeps_clear(
     rest. In a nearly singular pose any motion that ends clearer than it began is allowed.
     """
     now = determinant(jacobian) / m.neutral_determinant
-    if now >= FAR_FROM_SINGULAR:
+    if now >= m.far_from_singular:
         return True
     least = wp.min(real(wp.static(NEARLY_SINGULAR)), clearance(m, start.displacement, start.beta))
     if now < least:
         return False
+    if m.far_from_singular > real(1.0):
+        return brakes_clear(m, start, displacement, beta, extensions, rates, least, dt)
     halfway = extensions
     resting = extensions
     for i in range(6):
@@ -253,7 +313,7 @@ def keeps_clear(
     rest = forward_kinematics(
         m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
     )
-    return is_clear(m, middle, halfway, beta, least) and is_clear(m, rest, resting, beta, least)
+    return is_clear(m, middle, beta, least) and is_clear(m, rest, beta, least)
 
 
 @wp.struct
@@ -337,7 +397,7 @@ def with_legs(motion: Motion, extensions: vec6, rates: vec6) -> Motion:
 
 
 @wp.func
-def with_pose(motion: Motion, pose: vec6, pose_rate: vec6) -> Motion:
+def with_pose(motion: Motion, pose: vec7, pose_rate: vec6) -> Motion:
     """A motion with the platform's pose replaced."""
     after = motion
     after.displacement = vec3(pose[0], pose[1], pose[2])
@@ -348,16 +408,36 @@ def with_pose(motion: Motion, pose: vec6, pose_rate: vec6) -> Motion:
 
 
 @wp.func
-def pose_from_legs(m: Machine, motion: Motion, guess: Motion) -> Motion:
-    """The motion whose pose and rates follow from its legs, by forward kinematics from a neighboring one."""
-    pose = forward_kinematics(m.geometry, legs_of(motion.position), guess.displacement, guess.beta)
-    beta = vec3(pose[3], pose[4], pose[5])
-    jacobian = leg_jacobian(m.geometry, vec3(pose[0], pose[1], pose[2]), beta)
-    return with_pose(motion, pose, platform_rates(jacobian, beta, legs_of(motion.rate)))
+def held(motion: Motion, last: Motion) -> Motion:
+    """A motion whose legs stand still at the last pose."""
+    after = with_legs(motion, legs_of(last.position), vec6())
+    after.displacement = last.displacement
+    after.beta = last.beta
+    after.velocity = vec3()
+    after.beta_rate = vec3()
+    return after
 
 
 @wp.func
-def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
+def pose_from_legs(m: Machine, motion: Motion, last: Motion) -> Step:
+    """The motion whose pose and rates follow from its legs, by forward kinematics from the last pose.
+
+    Where no pose closes, the last one is held: an emergency stop.
+    """
+    result = Step()
+    pose = forward_kinematics(m.geometry, legs_of(motion.position), last.displacement, last.beta)
+    if pose[6] <= CLOSES:
+        beta = vec3(pose[3], pose[4], pose[5])
+        jacobian = leg_jacobian(m.geometry, vec3(pose[0], pose[1], pose[2]), beta)
+        result.motion = with_pose(motion, pose, platform_rates(jacobian, beta, legs_of(motion.rate)))
+    else:
+        result.motion = held(motion, last)
+        result.limits = wp.uint64(wp.static(_EMERGENCY_STOP))
+    return result
+
+
+@wp.func
+def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Step:
     """``target`` with each leg brought as near to its rate as its limits allow, and the pose that follows."""
     extensions = vec6()
     limited = vec6()
@@ -368,13 +448,15 @@ def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rate
 
 
 @wp.func
-def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Motion:
+def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Step:
     """Legs towards their requested rates, or braking to rest where that would lead into a singular pose."""
     moved = legs_towards(m, start, bounds, target, rates, dt)
-    s = moved.displacement
-    b = moved.beta
+    s = moved.motion.displacement
+    b = moved.motion.beta
     jacobian = leg_jacobian(m.geometry, s, b)
-    if keeps_clear(m, start, jacobian, s, b, legs_of(moved.position), legs_of(moved.rate)):
+    legs = legs_of(moved.motion.position)
+    leg_speeds = legs_of(moved.motion.rate)
+    if moved.limits == wp.uint64(0) and keeps_clear(m, start, jacobian, s, b, legs, leg_speeds, dt):
         return moved
     return legs_towards(m, start, bounds, target, vec6(), dt)
 
@@ -413,20 +495,20 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
     jacobian = leg_jacobian(m.geometry, displacement, beta)
     extensions = leg_extensions(m.geometry, displacement, beta)
     rates = leg_rates(jacobian, velocity, beta, beta_rate)
-    clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates)
-    mask = command_limits(m, start, bounds, action, rates, clear, dt)
+    clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates, dt)
+    result = Step()
+    result.limits = command_limits(m, start, bounds, action, rates, clear, dt)
     if legs_may_follow(m, bounds, extensions, rates, dt) and clear:
         after = with_legs(after, extensions, rates)
         after.displacement = displacement
         after.velocity = velocity
         after.beta = beta
         after.beta_rate = beta_rate
+        result.motion = after
     else:
-        after = limited_legs(m, start, bounds, after, rates, dt)
-
-    result = Step()
-    result.motion = after
-    result.limits = mask
+        limited = limited_legs(m, start, bounds, after, rates, dt)
+        result.motion = limited.motion
+        result.limits = result.limits | limited.limits
     return result
 
 
@@ -466,13 +548,15 @@ def actuate(
     environment: int,
     setpoint: Motion,
     dt: real,
-) -> Motion:
-    """The true motion after a step: the set-point after dead time and lag.
+) -> Step:
+    """The true motion after a step, the set-point after dead time and lag, and whether it was held.
 
     ``delay[environment, k]`` is the set-point k + 1 steps before ``setpoint``.
     """
+    result = Step()
     if m.has_dynamics == 0:
-        return setpoint
+        result.motion = setpoint
+        return result
     after = motion
     # New vectors: changing entries of a copied one loses gradients in Warp.
     position = vec9()
@@ -503,5 +587,6 @@ def actuate(
         after.velocity = setpoint.velocity
         after.beta = setpoint.beta
         after.beta_rate = setpoint.beta_rate
-        return after
+        result.motion = after
+        return result
     return pose_from_legs(m, after, motion)

@@ -189,13 +189,14 @@ def next_state(
 ) -> State:
     """One step of one environment with nine accelerations."""
     commanded = command(m, state.setpoint, action, dt)
-    motion = actuate(m, state.motion, delay, environment, commanded.motion, dt)
+    actuated = actuate(m, state.motion, delay, environment, commanded.motion, dt)
+    motion = actuated.motion
     acceleration = mean_acceleration(state.motion, motion, dt)
 
     after = State()
     after.sample = state.sample + 1
     after.setpoint = commanded.motion
-    after.limits = commanded.limits
+    after.limits = commanded.limits | actuated.limits
     after.motion = motion
     after.acceleration = acceleration
     after.setpoint_acceleration = mean_acceleration(state.setpoint, commanded.motion, dt)

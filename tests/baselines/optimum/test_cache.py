@@ -76,8 +76,8 @@ def test_a_damaged_plan_is_made_anew():
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(plan, tmp_path, monkeypatch):
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv("MOTION_CUEING_CACHE", str(tmp_path / "file"))
+    (tmp_path / "optimum").write_text("in the way")
+    monkeypatch.setenv("MOTION_CUEING_CACHE", str(tmp_path))
     store_plan("key", plan)
     assert load_plan("key", 20) is None
 

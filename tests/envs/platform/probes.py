@@ -81,6 +81,7 @@ def cab_kernel(
 class LegRows:
     extensions: wp.array(dtype=vec6)
     pose: wp.array(dtype=vec6)
+    error: wp.array(dtype=real)
     rates: wp.array(dtype=vec6)
     back: wp.array(dtype=vec6)
     u: wp.array(dtype=mat63)
@@ -100,7 +101,9 @@ def leg_kernel(
     rates = hexapod.leg_rates(jacobian, vec3(d[0], d[1], d[2]), beta, vec3(d[3], d[4], d[5]))
     extensions = hexapod.leg_extensions(g, vec3(p[0], p[1], p[2]), beta)
     out.extensions[i] = extensions
-    out.pose[i] = hexapod.forward_kinematics(g, extensions, vec3(), vec3())
+    found = hexapod.forward_kinematics(g, extensions, vec3(), vec3())
+    out.pose[i] = vec6(found[0], found[1], found[2], found[3], found[4], found[5])
+    out.error[i] = found[6]
     out.rates[i] = rates
     out.back[i] = hexapod.platform_rates(jacobian, beta, rates)
     out.u[i] = jacobian.u

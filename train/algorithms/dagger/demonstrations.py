@@ -9,8 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....envs.errors import DataError, reason
+from ....envs.limits import LARGEST_RESULTS, parse_json, read_arrays, read_bytes
 from ....envs.simulator.kernels.observation import OBSERVATION_SIZE
 from ....envs.simulator.simulator import N_AXES
 from ....envs.storage import write_bytes, write_text
@@ -144,10 +143,10 @@ def load_index(folder: str | Path) -> Index:
     """
     path = Path(folder) / INDEX
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = parse_json(read_bytes(path, LARGEST_RESULTS).decode("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None
-    except json.JSONDecodeError as error:
+    except ValueError as error:
         raise DataError(f"{path}: not JSON ({error})") from None
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise DataError(
@@ -189,8 +188,8 @@ def load_demonstrations(folder: str | Path) -> Iterator[Demonstration]:
         if not is_kept(Path(folder), entry):
             raise DataError(f"{path}: missing or damaged; record it anew with motion-cueing demonstrate")
         try:
-            with np.load(path, allow_pickle=False) as file:
-                columns = {name: file[name] for name in _COLUMNS}
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+            arrays = read_arrays(path)
+            columns = {name: arrays[name] for name in _COLUMNS}
+        except (KeyError, DataError) as error:
             raise DataError(f"{path}: not a demonstration ({error})") from None
         yield Demonstration(entry.name, **columns)
