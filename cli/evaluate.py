@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ..envs.errors import ConfigurationError
 from ..envs.progress import drives_progress
@@ -37,6 +37,8 @@ class EvaluateCommand:
     """Drives to score as they were driven, and their cues to drive: logs of `motion-cueing serve`."""
     platform: PlatformName = "paper"
     car: CarName = "sedan"
+    suite: Literal[1, 2] = 1
+    """Version of the standard maneuvers that `all` stands for."""
     out: OutFolder = Path("results")
 
 
@@ -178,7 +180,9 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
-        maneuvers=cue_sources(recorded) if recorded else arguments.find_maneuvers(command.maneuvers, car),
+        maneuvers=cue_sources(recorded)
+        if recorded
+        else arguments.find_maneuvers(command.maneuvers, car, command.suite),
         policies=drives,
         platform=platform,
         car=car,

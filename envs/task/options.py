@@ -66,7 +66,7 @@ class EpisodeOptions:
     terminate_on_failure: bool = False
 
     def __post_init__(self) -> None:
-        check_names("drive", self.drives, [*maneuver_names(), *recording_names()])
+        check_names("drive", self.drives, [*maneuver_names(None), *recording_names()])
         if self.random_start and self.duration is None:
             raise ValueError("random_start needs a duration, shorter than the drives")
 
