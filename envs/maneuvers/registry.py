@@ -50,7 +50,7 @@ SUITES: Final[Mapping[int, tuple[str, ...]]] = {
     1: tuple(name for name in _MANEUVERS.names() if name not in _ADDED),
     2: tuple(_MANEUVERS.names()),
 }
-"""Standard maneuvers by the version of the suite, the paper's three first; figures compare within a version."""
+"""Standard maneuvers by version of the suite, the paper's three first; figures compare within a version."""
 
 
 def maneuver_names(suite: int | None = 1) -> list[str]:

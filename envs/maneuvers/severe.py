@@ -71,7 +71,7 @@ CORNERS: Final = (
 
 
 def closed_lap(corners: tuple[tuple[float, float, float], ...], transition: float) -> Floats:
-    """Curvature of a lap every :data:`~..car.plans.STEP`; the straights are changed as little as closes it."""
+    """Curvature of a lap every :data:`~..car.plans.STEP`; straights are changed as little as closes it."""
     pieces = [bend(math.copysign(1.0 / r, angle), angle * DEGREE, transition) for _, r, angle in corners]
     before = np.array([length for length, _, _ in corners])
     heading, moved = 0.0, np.zeros(2)
