@@ -116,7 +116,7 @@ def test_new_cars_have_a_gearbox_a_stability_control_and_understeer(name):
 
 
 def test_a_bank_takes_the_side_force_off_the_driver():
-    """On a circle banked by atan(v^2 / R g) nobody is pushed aside."""
+    """On a circle banked by atan(v^2 / R g) hardly anybody is pushed aside; level, the body rolls as well."""
     speed, radius = 20.0, 120.0
     angle = np.arctan(speed**2 / (radius * GRAVITY))
     stations = np.arange(0.0, 500.0, 0.5)
@@ -125,8 +125,8 @@ def test_a_bank_takes_the_side_force_off_the_driver():
     level = Path.of_curvature(rise / radius)
     schedule = Schedule.of(speed, [Hold(20.0)])
     banked, flat = simulate([Plan("b", SEDAN, path, schedule), Plan("l", SEDAN, level, schedule)])
-    assert flat.specific_force[-1, 1] == pytest.approx(speed**2 / radius, rel=0.08)
-    assert abs(banked.specific_force[-1, 1]) < 0.15
+    assert flat.specific_force[-1, 1] == pytest.approx(speed**2 / radius, rel=0.12)
+    assert abs(banked.specific_force[-1, 1]) < 0.08 * flat.specific_force[-1, 1]
     assert np.abs(banked.channels["path_offset_m"]).max() < 0.3
     # The bank's roll is felt: its integral is the bank, right side down.
     assert 0.01 * banked.angular_velocity[:, 0].sum() == pytest.approx(angle, rel=0.05)
