@@ -35,12 +35,11 @@ def test_noise_and_bias_are_within_their_bounds_and_reach_for_them():
 
 
 def test_quantized_cues_are_multiples_of_a_step():
-    noisy = seen(FLAT, [1], force_noise=0.2, force_step=0.1)[0].specific_force
-    levels = np.unique(noisy)
-    assert len(levels) < 60
-    np.testing.assert_allclose(
-        np.diff(levels) / np.diff(levels).min(), np.round(np.diff(levels) / np.diff(levels).min())
-    )
+    for noisy in seen(FLAT, range(6), force_noise=0.2, force_step=0.1):
+        levels = np.unique(np.round(noisy.specific_force, 9))
+        step = np.diff(levels).min()
+        assert step < 0.1
+        np.testing.assert_allclose(np.diff(levels) / step, np.round(np.diff(levels) / step), atol=0.01)
 
 
 def test_drop_outs_hold_the_last_cue_for_their_share_and_duration():
