@@ -220,8 +220,8 @@ def make_policy(name: str, platform: Platform) -> Any:
     return policies.make_policy(name, platform)
 
 
-def find_maneuvers(names: Sequence[str], car: Car) -> dict[str, CueSource]:
-    """Label and source of the cues of each maneuver, recording or CSV file.
+def find_maneuvers(names: Sequence[str], car: Car, suite: int = 1) -> dict[str, CueSource]:
+    """Label and source of the cues of each maneuver, recording or CSV file; ``all`` is those of a suite.
 
     Files are read here, so that a broken one is refused before anything is driven.
     """
@@ -229,9 +229,10 @@ def find_maneuvers(names: Sequence[str], car: Car) -> dict[str, CueSource]:
     from ..envs.maneuvers import get_maneuver, get_recording, maneuver_names, recording_names
     from ..evaluation.suite import labels
 
-    maneuvers, recordings = maneuver_names(), recording_names()
+    maneuvers, recordings = maneuver_names(None), recording_names()
     known = [*maneuvers, *recordings]
-    expanded = [name for given in names for name in (known if given == ALL else [given])]
+    every = [*maneuver_names(suite), *recordings]
+    expanded = [name for given in names for name in (every if given == ALL else [given])]
     by_name = labels(expanded, [_stem("maneuver", name, [*known, ALL]) for name in expanded])
     sources: dict[str, CueSource] = {}
     for name, label in by_name.items():

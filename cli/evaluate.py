@@ -40,6 +40,8 @@ class EvaluateCommand:
     metrics: Annotated[tuple[Literal["feel"], ...], several("feel")] = ()
     """Tables beside the usual ones. `feel`: what people feel, and whether it agrees with J. It measures the
     incidence of motion sickness, too, and writes feel.md."""
+    suite: Literal[1, 2] = 1
+    """Version of the standard maneuvers that `all` stands for."""
     out: OutFolder = Path("results")
 
 
@@ -185,7 +187,9 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
-        maneuvers=cue_sources(recorded) if recorded else arguments.find_maneuvers(command.maneuvers, car),
+        maneuvers=cue_sources(recorded)
+        if recorded
+        else arguments.find_maneuvers(command.maneuvers, car, command.suite),
         policies=drives,
         platform=platform,
         car=car,

@@ -37,7 +37,7 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
 
     kinds = [
         ("Policies", policies.policy_names(), policies.describe_policy),
-        ("Maneuvers", maneuvers.maneuver_names(), maneuvers.describe_maneuver),
+        ("Maneuvers", maneuvers.maneuver_names(None), maneuvers.describe_maneuver),
         ("Recorded drives", maneuvers.recording_names(), maneuvers.describe_recording),
         (
             "Motion bases",

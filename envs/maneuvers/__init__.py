@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .registry import (
+    SUITES,
     describe_maneuver,
     describe_recording,
     get_maneuver,
@@ -19,17 +20,31 @@ from .registry import (
 )
 
 if TYPE_CHECKING:
-    from .sampling import RandomDrives, drive_seeds, random_drive, random_drives
+    from .sampling import (
+        HELD_OUT_SEEDS,
+        RandomDrives,
+        drive_seeds,
+        drives_names,
+        held_out_drives,
+        load_drives,
+        random_drive,
+        random_drives,
+    )
     from .standard import Maneuver
 
 __all__ = [
+    "HELD_OUT_SEEDS",
+    "SUITES",
     "Maneuver",
     "RandomDrives",
     "describe_maneuver",
     "describe_recording",
     "drive_seeds",
+    "drives_names",
     "get_maneuver",
     "get_recording",
+    "held_out_drives",
+    "load_drives",
     "maneuver_names",
     "random_drive",
     "random_drives",

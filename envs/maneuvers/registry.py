@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ..cues import CueTrace
-from ..errors import look_up
+from ..errors import ConfigurationError, look_up
 from ..registry import Registry
 
 if TYPE_CHECKING:
@@ -33,6 +33,10 @@ for _name, _where, _about in (
     ("stop-and-go", "standard:StopAndGo", "three stops in a queue, up to 40 km/h"),
     ("roundabout", "standard:Roundabout", "roundabout of 18 m at 26 km/h, third exit, from and to 50 km/h"),
     ("hill", "standard:Hill", "8 % up and down at 60 km/h"),
+    ("gear-change", "severe:GearChange", "2 m/s^2 from rest to 100 km/h through the gears (suite 2)"),
+    ("circuit", "severe:CircuitLap", "one lap of a racing circuit at 0.75 g (suite 2)"),
+    ("limit-handling", "severe:LimitHandling", "sine with dwell and J-turn at full severity (suite 2)"),
+    ("surge-and-brake", "severe:SurgeAndBrake", "a minute of acceleration, then full braking (suite 2)"),
 ):
     _MANEUVERS.register(_name, f"{__package__}.{_where}", _about)
 
@@ -40,8 +44,31 @@ for _name, _where, _about in (
 register = _MANEUVERS.register
 """Give a maneuver or its class a name, see :meth:`~motion_cueing.envs.registry.Registry.register`."""
 
-maneuver_names = _MANEUVERS.names
-"""Names that :func:`get_maneuver` knows, the paper's three first."""
+_ADDED: Final = ("gear-change", "circuit", "limit-handling", "surge-and-brake")
+
+SUITES: Final[Mapping[int, tuple[str, ...]]] = {
+    1: tuple(name for name in _MANEUVERS.names() if name not in _ADDED),
+    2: tuple(_MANEUVERS.names()),
+}
+"""Standard maneuvers by version of the suite, the paper's three first; figures compare within a version."""
+
+
+def maneuver_names(suite: int | None = 1) -> list[str]:
+    """Names of the standard maneuvers of a suite, the paper's three first, and of those of other packages.
+
+    Args:
+        suite: One of :data:`SUITES`; None for every name that :func:`get_maneuver` knows.
+
+    Raises:
+        ConfigurationError: there is no such suite.
+    """
+    if suite is None:
+        return _MANEUVERS.names()
+    if suite not in SUITES:
+        raise ConfigurationError(f"suite {suite} is unknown; use one of {', '.join(map(str, SUITES))}")
+    later = {name for names in SUITES.values() for name in names} - {*SUITES[suite]}
+    return [name for name in _MANEUVERS.names() if name not in later]
+
 
 describe_maneuver = _MANEUVERS.description
 """One line about a maneuver."""

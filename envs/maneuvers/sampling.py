@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Final
 
@@ -21,9 +20,7 @@ from ..settings import (
     check_range,
     configuration,
     load,
-    merge,
     preset_names,
-    read_yaml,
 )
 from .bumps import with_bumps, with_kerbs
 from .drivers import STANDARD, DrawnDriver, Drivers
@@ -355,17 +352,8 @@ def _file_of(name: str | pathlib.Path) -> pathlib.Path:
 
 
 def named_drives(values: object) -> object:
-    """A distribution given by its name or file, or by fields that change the one named ``preset``."""
-    if isinstance(values, str | pathlib.Path):
-        return load_drives(values)
-    if isinstance(values, Mapping) and "preset" in values:
-        below, rest = (
-            read_yaml(_file_of(values["preset"])),
-            {k: v for k, v in values.items() if k != "preset"},
-        )
-        assert isinstance(below, dict)
-        return merge(below, rest)
-    return values
+    """A distribution given by its name or file, or its fields as they are."""
+    return load_drives(values) if isinstance(values, str | pathlib.Path) else values
 
 
 NamedDrives = Annotated[RandomDrives, BeforeValidator(named_drives)]

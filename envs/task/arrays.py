@@ -9,14 +9,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from ..arrays import Mirror, real, vec9
+from ..arrays import FLOAT, Mirror, real, vec6, vec9
+from ..cues import CueTrace
 from ..launch import Launch
 from ..platform.machines import Platform
 from ..simulator.kernels.observation import OBSERVATION_SIZE
 from ..simulator.simulator import Simulator
 from .kernels.action import action_scales
 from .kernels.episode import Arrays, Command, Rules, ask, forget, look, play
-from .kernels.observation import Episode, Layout, ability_of, view_of
+from .kernels.observation import Episode, Layout, ability_of, lifted_cues, view_of
 from .kernels.reward import reward_of, vec_terms
 from .options import TaskOptions
 
@@ -67,14 +68,25 @@ _CONSTANT: Final = ("bounds", "memory")
 
 
 def rules_of(
-    options: TaskOptions, layout: Layout, platforms: Sequence[Platform], dt: float, device: Any
+    options: TaskOptions,
+    layout: Layout,
+    platforms: Sequence[Platform],
+    dt: float,
+    device: Any,
+    sensed: Sequence[CueTrace] = (),
 ) -> Any:
-    """What is the same for a whole batch, as the kernels read it."""
+    """What is the same for a whole batch, as the kernels read it.
+
+    ``sensed`` are the drives as the car's sensors give them, if these have errors.
+    """
     rules: Any = Rules()
     rules.action = action_scales(platforms, options.action, device)
     rules.reward = reward_of(options.reward, options.episode.terminate_on_failure)
     noise = options.randomization.force_noise, options.randomization.rate_noise
     rules.view = view_of(layout, options.observation, dt, noise)
+    rules.view.sensed = int(bool(sensed))
+    rows = lifted_cues(sensed) if sensed else np.zeros((1, 6))
+    rules.view.sensed_cues = wp.array(rows.astype(FLOAT), dtype=vec6, device=device)
     if options.observation.machine:
         abilities = np.array([ability_of(platform) for platform in platforms])
         rules.view.abilities = wp.array(abilities, dtype=wp.float32, device=device)

@@ -29,6 +29,7 @@ from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_
 from .arrays import FRAME, BatchArrays, Launches, rules_of
 from .kernels.observation import layout_of, low_passed
 from .options import TaskOptions
+from .sensors import sensed_drives
 
 Array = NDArray[Any]
 Mask = NDArray[np.bool_]
@@ -221,11 +222,15 @@ class TaskBase(_Remembering):
         super().__init__(policy, simulator.n)
         self.every = repeat
         layout = layout_of(task.observation, task.action.mode, task.action.size)
-        memory = low_passed(drives, task.observation.memory, TIME_STEP)
+        sensors = options.randomization.car_sensors
+        sensed = sensed_drives(drives, sensors, options.episode.library_seed)
+        memory = low_passed(sensed, task.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, simulator.device)
         self.memories = ((self.arrays.memory, task.observation.memory),)
         self.arrays.episode, self.arrays.begins = shared.episode, shared.begins
-        rules = rules_of(task, layout, simulator.platforms, TIME_STEP, simulator.device)
+        rules = rules_of(
+            task, layout, simulator.platforms, TIME_STEP, simulator.device, () if sensors.perfect else sensed
+        )
         self._launches = Launches(simulator, self.arrays, rules)
         self._commanded = self.arrays.command.view["commanded"]
 

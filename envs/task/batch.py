@@ -37,6 +37,7 @@ from .episode import (
 from .kernels.action import action_scale
 from .kernels.observation import COMPARED, layout_of, low_passed
 from .options import TaskOptions
+from .sensors import sensed_drives
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -89,7 +90,9 @@ class Batch:
         self.platform = self.simulator.platforms[0]
         self.action_size = gains_of(policy) if options.action.mode == "gains" else options.action.size
         self.layout = layout_of(options.observation, options.action.mode, self.action_size)
-        memory = low_passed(self.drives, options.observation.memory, TIME_STEP)
+        sensors = options.randomization.car_sensors
+        seen = sensed_drives(self.drives, sensors, options.episode.library_seed)
+        memory = low_passed(seen, options.observation.memory, TIME_STEP)
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
         self._clipped: NDArray[np.int32] = self.arrays.command.view["clipped"]
         self.base = self._base(policy)
@@ -100,7 +103,9 @@ class Batch:
         self._cost_scales = cost_scales(self.drives, options.reward)
         self._lengths = np.array([len(drive) for drive in self.drives])
         self._keys, self._episodes = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.int64)
-        self.rules = rules_of(options, self.layout, platforms, TIME_STEP, self.simulator.device)
+        self.rules = rules_of(
+            options, self.layout, platforms, TIME_STEP, self.simulator.device, () if sensors.perfect else seen
+        )
         self._launches = Launches(self.simulator, self.arrays, self.rules)
         self.beside = self._base_alone(policy)
 

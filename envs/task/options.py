@@ -32,6 +32,7 @@ from ..settings import (
 from .kernels.action import ActionOptions
 from .kernels.observation import ObservationOptions
 from .kernels.reward import RewardOptions
+from .sensors import CarSensors
 
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
@@ -44,8 +45,8 @@ class EpisodeOptions:
 
     Args:
         drives: Maneuvers and recordings by name, one drawn for each episode; none for random drives.
-        random: The random drives, and the cars that drive them and the maneuvers; a distribution by name,
-            such as ``broad``, by its YAML file, or by fields that change the one named ``preset``.
+        random: The random drives, and the cars that drive them and the maneuvers; fields, the name of a
+            distribution, such as ``broad``, or its YAML file.
         library: Random drives to draw from. They are made when the environment is.
         library_seed: Of the random drives, and of the machines and cars of the randomization.
         drive_duration: Of a random drive, s.
@@ -66,7 +67,7 @@ class EpisodeOptions:
     terminate_on_failure: bool = False
 
     def __post_init__(self) -> None:
-        check_names("drive", self.drives, [*maneuver_names(), *recording_names()])
+        check_names("drive", self.drives, [*maneuver_names(None), *recording_names()])
         if self.random_start and self.duration is None:
             raise ValueError("random_start needs a duration, shorter than the drives")
 
@@ -85,6 +86,7 @@ class RandomizationOptions:
         sensor_gain: Largest relative error of the cab's accelerometers and gyroscopes.
         force_noise: Standard deviation of the noise of the cab's accelerometers, m/s^2.
         rate_noise: Standard deviation of the noise of its gyroscopes, rad/s.
+        car_sensors: Errors of the car's cues as they are seen; the reward knows the true ones.
     """
 
     friction: tuple[Positive, Positive] = (1.0, 1.0)
@@ -96,6 +98,7 @@ class RandomizationOptions:
     sensor_gain: Share = 0.0
     force_noise: NonNegative = 0.0
     rate_noise: NonNegative = 0.0
+    car_sensors: CarSensors = CarSensors()
 
     def __post_init__(self) -> None:
         for name in ("friction", "natural_frequency", "dead_time"):

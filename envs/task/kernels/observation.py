@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.signal import lfilter
 
-from ...arrays import float_rows, pair_array, real, real_rows, vec2, vec3, vec9
+from ...arrays import float_rows, pair_array, real, real_rows, vec2, vec3, vec6, vec9
 from ...cues import GRAVITY, CueTrace
 from ...platform.kernels.step import Machine, Motion
 from ...platform.kinematics import axis_reach
@@ -460,6 +460,10 @@ Firsts: Any = wp.struct(
 """Where each added row begins in a frame, -1 for one that is not there."""
 
 
+rows6: Any = wp.array(dtype=vec6)
+"""Six cues a sample."""
+
+
 @wp.struct
 class View:
     """The kernel's form of a layout and of how it is filled."""
@@ -472,7 +476,17 @@ class View:
     modeled: int  # whether the cab's cues are those of the set-points
     force_noise: real  # m/s^2
     rate_noise: real  # rad/s
+    sensed: int  # whether the car's cues are seen by sensors with errors
+    sensed_cues: rows6  # their cues, of every sample of every drive, f lifted and omega
     abilities: float_rows  # what each machine can do, the constant rows
+
+
+def lifted_cues(drives: Sequence[CueTrace]) -> NDArray[np.float64]:
+    """(samples of all drives, 6) specific force with gravity at rest taken off z, m/s^2, and rates, rad/s."""
+    lift = np.array([0.0, 0.0, GRAVITY, 0.0, 0.0, 0.0])
+    return np.concatenate(
+        [np.hstack((drive.specific_force, drive.angular_velocity)) + lift for drive in drives]
+    )
 
 
 def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[float, float]) -> Any:
@@ -558,7 +572,7 @@ def put_measured(
 def put_preview(
     v: View, drives: Drives, drive: int, sample: int, bounds: pair_array, out: float_rows, i: int
 ) -> int:
-    """Write the car's cues ahead, the last one of the drive after its end."""
+    """Write the true cues of the car ahead, the last one of the drive after its end."""
     first = drives.first[drive]
     last = drives.length[drive] - 1
     for j in range(v.preview_samples):
@@ -696,6 +710,11 @@ def write_frame(
     acceleration = axes_in_view(v, s.setpoint, acceleration_in_view(v, s))
     motion = motion_in_view(v, s.setpoint)
     write_observation(machine, s, motion, acceleration, cues_in_view(v, machine, s), fixed, i)
+    if v.sensed != 0:
+        seen = v.sensed_cues[drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)]
+        for k in range(3):
+            fixed[i, REFERENCE_FORCE + k] = seen[k] / wp.static(UNIT["reference_force"])
+            fixed[i, REFERENCE_RATE + k] = seen[3 + k] / wp.static(UNIT["reference_rate"])
     put_measured(v, e, s.sample, fixed, bounds, out, i)
     for k in range(now.shape[1]):
         put_entry(out, i, f.last_action + k, real(now[i, k]), bounds)
