@@ -12,11 +12,21 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
 from . import arguments
-from .arguments import ALL, BENCHMARK, CarName, ManeuverNames, OutFolder, PlatformName, PolicyNames, several
+from .arguments import (
+    ALL,
+    BENCHMARK,
+    CarName,
+    ManeuverNames,
+    OutFolder,
+    PlatformName,
+    PolicyNames,
+    ScaleText,
+    several,
+)
 
 if TYPE_CHECKING:
     from ..envs.car import Car
-    from ..envs.cues import CueTrace
+    from ..envs.cues import CueScale, CueTrace
     from ..envs.platform import Platform
     from ..evaluation.results import Results
     from ..evaluation.suite import CueSource, Drive, Outcome
@@ -37,6 +47,7 @@ class EvaluateCommand:
     """Drives to score as they were driven, and their cues to drive: logs of `motion-cueing serve`."""
     platform: PlatformName = "paper"
     car: CarName = "sedan"
+    scale: ScaleText = "1"
     out: OutFolder = Path("results")
 
 
@@ -75,6 +86,7 @@ class Plan:
         policies: Drives by label.
         out: Folder of the output.
         arguments: The command line.
+        scale: Motion scale of the reference.
         skipped: Policies of the benchmark that cannot be driven here, and why; what is left out of a replay.
     """
 
@@ -84,6 +96,7 @@ class Plan:
     car: Car
     out: Path
     arguments: tuple[str, ...]
+    scale: CueScale
     skipped: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -164,13 +177,17 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         command: Its arguments.
         words: The command line, program first.
     """
-    from ..evaluation.suite import DRIVEN, cue_sources, load_drives
+    from ..envs.cues import CueScale
+    from ..evaluation.suite import DRIVEN, at_scale, cue_sources, load_drives, scale_of
 
     check_folder("--out", command.out)
     check_own_json("--out", command.out / "results.json", frozenset({"schema", "provenance"}))
     platform, car = arguments.find_platform(command.platform), arguments.find_car(command.car)
     if command.replays and command.maneuvers != EvaluateCommand().maneuvers:
         raise ConfigurationError("--replays have their own cues; leave --maneuvers out")
+    scale = CueScale.parse(command.scale)
+    if command.replays and not scale.neutral:
+        raise ConfigurationError("--replays have been driven at their own scale; leave --scale out")
     recorded, skipped = load_drives(command.replays, platform)
     drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
     if command.policies or not recorded:
@@ -178,12 +195,15 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
-        maneuvers=cue_sources(recorded) if recorded else arguments.find_maneuvers(command.maneuvers, car),
+        maneuvers=cue_sources(recorded)
+        if recorded
+        else at_scale(arguments.find_maneuvers(command.maneuvers, car), scale),
         policies=drives,
         platform=platform,
         car=car,
         out=command.out,
         arguments=tuple(words),
+        scale=scale_of(recorded) if recorded else scale,
         skipped=skipped,
     )
 
@@ -209,7 +229,7 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
     """The results of an outcome, with what made them."""
     from ..evaluation.results import Provenance, Results
 
-    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata)
+    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata, plan.scale)
     return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.skipped, notes=outcome.notes)
 
 

@@ -16,7 +16,7 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import compilation_announced
 from ..envs.storage import check_file
 from . import arguments
-from .arguments import CarName, ManeuverName, Name, PlatformName, PolicyName, Whole, option
+from .arguments import CarName, ManeuverName, Name, PlatformName, PolicyName, ScaleText, Whole, option
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
@@ -43,6 +43,7 @@ class ServeCommand:
     rate: Whole = 1000
     """Set-points a second, a multiple of 100; the policy acts 100 times a second."""
     platform: PlatformName = "paper"
+    scale: ScaleText = "1"
     host: str = "127.0.0.1"
     """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
     port: Whole = DEFAULT_PORT
@@ -163,6 +164,7 @@ def _check(command: ServeCommand) -> None:
 
 
 def _made(command: ServeCommand) -> _Served:
+    from ..envs.cues import CueScale
     from ..realtime.controller import Controller, ControllerOptions
     from ..realtime.inbox import CueBounds, Inbox
     from ..realtime.machine import make_machine
@@ -171,7 +173,7 @@ def _made(command: ServeCommand) -> _Served:
     from ..realtime.watchdog import WatchdogOptions
 
     watchdog = WatchdogOptions(command.overdue, command.hold, command.stale, command.steady, command.fade)
-    options = ControllerOptions(rate=command.rate, watchdog=watchdog)
+    options = ControllerOptions(rate=command.rate, watchdog=watchdog, scale=CueScale.parse(command.scale))
     peer = address_of(command.peer, 0) if command.peer else None
     bounds = CueBounds(command.max_force, command.max_angular_velocity)
     inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..envs.cues import CueScale
 from ..envs.errors import DataError, reason
 from ..envs.platform.kernels import ACTUATORS
 from ..envs.storage import write_bytes
@@ -190,6 +191,11 @@ class Trajectory:
     def label(self) -> str:
         """Maneuver and policy, for messages."""
         return f"{self.maneuver}/{self.policy}"
+
+    @property
+    def scale(self) -> CueScale:
+        """Motion scale of its reference."""
+        return CueScale.parse(self.metadata.get("scale", "1"))
 
     @property
     def dt(self) -> float:

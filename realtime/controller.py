@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..baselines.interface import Interface, MachineInterface, Machines
 from ..baselines.policy import Policy, Wrapper, as_policy
-from ..envs.cues import CueTrace
+from ..envs.cues import CueScale, CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
@@ -40,9 +40,14 @@ _CHUNK: Final = 6000
 
 
 class LoopLog:
-    """One row a time step: cues in use, accelerations, time the policy took, state of the controller."""
+    """One row a time step: cues in use, accelerations, time the policy took, state of the controller.
 
-    def __init__(self) -> None:
+    Args:
+        scale: Motion scale at which cues are logged.
+    """
+
+    def __init__(self, scale: CueScale = CueScale()) -> None:
+        self._scale = scale
         self._chunks: list[NDArray[Any]] = []
         self._length = 0
 
@@ -97,7 +102,7 @@ class LoopLog:
         # The controller had the angular acceleration of the step before.
         change = np.diff(rate, axis=0, prepend=rate[:1]) / TIME_STEP
         time = np.asarray(TIME_STEP * np.arange(len(rows)), dtype=np.float64)
-        cues = CueTrace("loop", time, force, rate, change, source="in the loop")
+        cues = CueTrace("loop", time, force, rate, change, source="in the loop", scale=self._scale)
         machines = Machines([cues], [platform], None, get_vestibular_model(vestibular))
         run = Rollout(_Replay(as_policy(policy), rows["action"]), machines, start)
         steps = {f"loop_{state.name.lower()}": str(int((states == state).sum())) for state in State}
@@ -145,11 +150,13 @@ class ControllerOptions:
         rate: Set-points a second; a multiple of the policies' 100.
         watchdog: Its time limits.
         brake: How the machine brakes to neutral.
+        scale: Motion scale: cues are scaled before the policy sees them, and are logged so.
     """
 
     rate: int = 1000
     watchdog: WatchdogOptions = WatchdogOptions()
     brake: BrakeOptions = BrakeOptions()
+    scale: CueScale = CueScale()
 
     def __post_init__(self) -> None:
         decisions = round(1.0 / TIME_STEP)
@@ -179,7 +186,8 @@ class Controller:
         self, machine: LiveMachine, platform: Platform, inbox: Inbox, options: ControllerOptions
     ) -> None:
         self.inbox, self._machine, self._options = inbox, machine, options.watchdog
-        self.state, self.log = State.NEUTRAL, LoopLog()
+        self._scale = options.scale
+        self.state, self.log = State.NEUTRAL, LoopLog(options.scale)
         self.faults: list[str] = []
         self.periods = 0
         self._brake = BrakeToNeutral(platform, machine.start, options.brake)
@@ -275,4 +283,7 @@ class Controller:
             self._echo = newest.sequence, newest.time, self.inbox.arrival
             share = min(self._faded * TIME_STEP / fade, 1.0) if fade > 0.0 else 1.0
             self._faded += 1
-        return np.asarray(AT_REST + share * (np.array(newest.force + newest.rate) - AT_REST))
+        cues = np.array(newest.force + newest.rate)
+        if not self._scale.neutral:
+            cues = np.concatenate([self._scale.of_force(cues[:3]), self._scale.of_rates(cues[3:])])
+        return np.asarray(AT_REST + share * (cues - AT_REST))

@@ -233,7 +233,7 @@ def library_of(episode: EpisodeOptions, randomization: RandomizationOptions) -> 
         DataError: a car left the range of its model.
     """
     make = _named_drives if episode.drives else _random_drives
-    return tuple(make(episode, randomization))
+    return tuple(drive.scaled(episode.scale) for drive in make(episode, randomization))
 
 
 def platform_of(options: TaskOptions) -> Platform:

@@ -170,7 +170,7 @@ def _all_of(results: Results) -> str:
 
 
 def suite_table(results: Results) -> TextTable:
-    """The policies over the suite, best first."""
+    """The policies over the suite, best first; a motion scale other than 1 stands in the title."""
     scored = any(
         s.normalized_score is not None or s.perceived_normalized_score is not None for s in results.scores
     )
@@ -187,13 +187,22 @@ def suite_table(results: Results) -> TextTable:
     ]
     scores = SCORES.values() if scored else ()
     header = ("policy", "mean J", "mean perceived J", *scores, "best on", "worst maneuver")
-    return TextTable(_all_of(results), header, tuple(rows), (0,))
+    return TextTable(_all_of(results) + at_scale(results), header, tuple(rows), (0,))
+
+
+def at_scale(results: Results) -> str:
+    """The motion scale of results for a title; empty where it is neutral."""
+    scale = results.provenance.scale
+    return "" if scale.neutral else f", motion scale {scale}"
 
 
 def print_results(console: Console, results: Results) -> None:
     """Show a table a maneuver, the suite, the verdicts, wrong solves, skipped policies and failures."""
     for maneuver, drives in results.maneuvers.items():
-        print_table(console, maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)))
+        print_table(
+            console,
+            maneuver_table(maneuver + at_scale(results), drives, results.normalized_scores.get(maneuver)),
+        )
     if results.scores:
         print_table(console, suite_table(results))
     for verdict in results.verdicts:
