@@ -115,7 +115,7 @@ ScaleText = Annotated[
     str,
     option(
         "SCALE",
-        help="Motion scale of the reference: a number, or one each of force, rates or the axes x, y, z, roll, "
+        help="Motion scale of the reference: a number, or one each of force, rates or axes x, y, z, roll, "
         "pitch and yaw, as `force=0.6,rates=0.5`.",
     ),
 ]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 from pydantic import JsonValue
 from typing_extensions import Self
 
-from ..envs.cues import CueScale
+from ..envs.cues import UNSCALED, CueScale
 from ..envs.errors import ConfigurationError, DataError, reason
 from ..envs.provenance import now, package_version, plain, versions
 from ..envs.settings import configuration, from_dict, renamed, to_dict
@@ -191,7 +191,7 @@ class Provenance:
     platform: str
     car: str
     configuration: dict[str, JsonValue]
-    scale: CueScale = CueScale()
+    scale: CueScale = UNSCALED
 
     @classmethod
     def of(
@@ -200,7 +200,7 @@ class Provenance:
         platform: Any,
         car: Any,
         policies: Mapping[str, Any],
-        scale: CueScale = CueScale(),
+        scale: CueScale = UNSCALED,
     ) -> Self:
         """The origin of results that a command line makes now, with the metadata of each policy."""
         return cls(

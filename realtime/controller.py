@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..baselines.interface import Interface, MachineInterface, Machines
 from ..baselines.policy import Policy, Wrapper, as_policy
-from ..envs.cues import CueScale, CueTrace
+from ..envs.cues import UNSCALED, CueScale, CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
@@ -46,7 +46,7 @@ class LoopLog:
         scale: Motion scale at which cues are logged.
     """
 
-    def __init__(self, scale: CueScale = CueScale()) -> None:
+    def __init__(self, scale: CueScale = UNSCALED) -> None:
         self._scale = scale
         self._chunks: list[NDArray[Any]] = []
         self._length = 0
@@ -156,7 +156,7 @@ class ControllerOptions:
     rate: int = 1000
     watchdog: WatchdogOptions = WatchdogOptions()
     brake: BrakeOptions = BrakeOptions()
-    scale: CueScale = CueScale()
+    scale: CueScale = UNSCALED
 
     def __post_init__(self) -> None:
         decisions = round(1.0 / TIME_STEP)

@@ -199,10 +199,8 @@ def at_scale(results: Results) -> str:
 def print_results(console: Console, results: Results) -> None:
     """Show a table a maneuver, the suite, the verdicts, wrong solves, skipped policies and failures."""
     for maneuver, drives in results.maneuvers.items():
-        print_table(
-            console,
-            maneuver_table(maneuver + at_scale(results), drives, results.normalized_scores.get(maneuver)),
-        )
+        title, scores = maneuver + at_scale(results), results.normalized_scores.get(maneuver)
+        print_table(console, maneuver_table(title, drives, scores))
     if results.scores:
         print_table(console, suite_table(results))
     for verdict in results.verdicts:

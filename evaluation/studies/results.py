@@ -227,16 +227,13 @@ def standstill_table(results: StudyResults) -> TextTable:
     Standing still costs the square of the motion scale. So this is what compares scales; J is not.
     """
     still = results.across(STILL)
-    rows = [
-        (
-            policy,
-            *(
-                NOTHING if s is None or rest is None or not rest.cue_error else f"{s.cue_error / rest.cue_error:.2f}"
-                for s, rest in zip(results.across(policy), still, strict=True)
-            ),
-        )
-        for policy in results.driven
-    ]  # fmt: skip
+    rows = []
+    for policy in results.driven:
+        cells = [
+            NOTHING if s is None or rest is None else f"{s.cue_error / rest.cue_error:.2f}"
+            for s, rest in zip(results.across(policy), still, strict=True)
+        ]
+        rows.append((policy, *cells))
     return TextTable(f"J over that of {STILL}", ("policy", *results.conditions), tuple(rows))
 
 
