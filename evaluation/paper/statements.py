@@ -39,6 +39,9 @@ ONSET_WINDOW: Final = 1.5
 SETTLED: Final = 5.0
 """Length of the end of a steady turn over which steady values are taken, s."""
 
+_AWAY: Final = math.radians(1.0)
+"""Distance from its angle above which tilt is on its way there."""
+
 _AXES: Final = ("f_x", "f_y", "f_z", "roll rate", "pitch rate", "yaw rate")
 _REST: Final = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
 
@@ -200,10 +203,20 @@ def tilting(case: str, t: Trajectory, p: WashoutParameters, motion: Motion, rate
         Check(case, "largest tilt rate", limits, fastest, "deg/s", 2.8, 3.15),
         Check(case, "largest tilt acceleration", limits, hardest, "deg/s²", 6.0, 11.0),
     ]
-    if case != "BRK":  # Its only tilt is limited throughout, and has no target to be compared with.
-        pitch = np.cumsum(rates[:, 1]) * t.dt
-        held = error(pitch, tilt(p, t, motion)[:, 1])
-        checks.append(Check(case, "tilt in pitch: error against N fL", "Eq. (19)", held, "", 0.0, 0.05))
+    target = tilt(p, t, motion)[:, 1]
+    pitch = np.cumsum(rates[:, 1]) * t.dt
+    if case != "BRK":
+        held = error(pitch, target)
+        return [
+            *checks,
+            Check(case, "tilt in pitch: error against N fL", "Eq. (19)", held, "", 0.0, 0.015),
+        ]
+    # It is limited throughout: it must always move towards its angle.
+    away = np.abs(target - pitch) > _AWAY
+    towards = float(np.mean(np.sign(rates[away, 1]) == np.sign((target - pitch)[away])))
+    checks.append(
+        Check(case, "share of time in which tilt moves to N fL", "Eq. (19)", towards, "", 0.99, 1.0)
+    )
     return checks
 
 

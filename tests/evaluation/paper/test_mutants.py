@@ -20,6 +20,8 @@ NOTICED = (
     "EST3 rate_scale pitch reversed",
     "EST3 rate_scale yaw reversed",
     "EST3 tilt limits off",
+    "EST1 tilt low-pass opened",
+    "BRK tilt low-pass opened",
     "BRK cue w_y absent",
     "BRK force_scale x 0.9",
     "BRK output of hps_z reversed",
