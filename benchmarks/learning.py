@@ -3,8 +3,9 @@
     python -m benchmarks.learning --out results/learning.json
     python -m benchmarks.learning --algorithms ppo --minutes 2 --task cueing
 
-Each training is ``MlpPolicy`` with the default hyperparameters of its class, on 16 environments. J is that of the deterministic policy on random drives that are never trained on, at the start and about
-every minute of processor time. A training that is in the file already is not repeated.
+Each training is ``MlpPolicy`` with the default hyperparameters of its class, on 16 environments. J is that of
+the deterministic policy on random drives that are never trained on, at the start and about every minute of
+processor time. A training that is in the file already is not repeated.
 """
 
 from __future__ import annotations

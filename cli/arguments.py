@@ -111,6 +111,14 @@ PlatformName = Annotated[
     str, option("NAME|FILE", completer=named("Motion bases"), help="Motion base, by name or YAML file.")
 ]
 CarName = Annotated[str, option("NAME|FILE", completer=named("Cars"), help="Car, by name or YAML file.")]
+ScaleText = Annotated[
+    str,
+    option(
+        "SCALE",
+        help="Motion scale of the reference: a number, or one each of force, rates or axes x, y, z, roll, "
+        "pitch and yaw, as `force=0.6,rates=0.5`.",
+    ),
+]
 OutFolder = Annotated[Path, option("DIR", help="Folder for everything that is written; made if missing.")]
 Workers = Annotated[
     int, option("N", converter=whole_number, help="Processes or threads that work at a time.")

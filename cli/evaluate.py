@@ -12,11 +12,21 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
 from . import arguments
-from .arguments import ALL, BENCHMARK, CarName, ManeuverNames, OutFolder, PlatformName, PolicyNames, several
+from .arguments import (
+    ALL,
+    BENCHMARK,
+    CarName,
+    ManeuverNames,
+    OutFolder,
+    PlatformName,
+    PolicyNames,
+    ScaleText,
+    several,
+)
 
 if TYPE_CHECKING:
     from ..envs.car import Car
-    from ..envs.cues import CueTrace
+    from ..envs.cues import CueScale, CueTrace
     from ..envs.platform import Platform
     from ..evaluation.results import Results
     from ..evaluation.suite import CueSource, Drive, Outcome
@@ -42,6 +52,7 @@ class EvaluateCommand:
     incidence of motion sickness, too, and writes feel.md."""
     suite: Literal[1, 2] = 1
     """Version of the standard maneuvers that `all` stands for."""
+    scale: ScaleText = "1"
     out: OutFolder = Path("results")
 
 
@@ -80,6 +91,7 @@ class Plan:
         policies: Drives by label.
         out: Folder of the output.
         arguments: The command line.
+        scale: Motion scale of the reference.
         skipped: Policies of the benchmark that cannot be driven here, and why; what is left out of a replay.
         feel: Whether the tables of what people feel are shown and written.
     """
@@ -90,6 +102,7 @@ class Plan:
     car: Car
     out: Path
     arguments: tuple[str, ...]
+    scale: CueScale
     skipped: Mapping[str, str] = field(default_factory=dict)
     feel: bool = False
 
@@ -173,13 +186,17 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         command: Its arguments.
         words: The command line, program first.
     """
-    from ..evaluation.suite import DRIVEN, cue_sources, load_drives
+    from ..envs.cues import CueScale
+    from ..evaluation.suite import DRIVEN, at_scale, cue_sources, load_drives, scale_of
 
     check_folder("--out", command.out)
     check_own_json("--out", command.out / "results.json", frozenset({"schema", "provenance"}))
     platform, car = arguments.find_platform(command.platform), arguments.find_car(command.car)
     if command.replays and command.maneuvers != EvaluateCommand().maneuvers:
         raise ConfigurationError("--replays have their own cues; leave --maneuvers out")
+    scale = CueScale.parse(command.scale)
+    if command.replays and not scale.neutral:
+        raise ConfigurationError("--replays have been driven at their own scale; leave --scale out")
     recorded, skipped = load_drives(command.replays, platform)
     drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
     if command.policies or not recorded:
@@ -189,12 +206,13 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     return Plan(
         maneuvers=cue_sources(recorded)
         if recorded
-        else arguments.find_maneuvers(command.maneuvers, car, command.suite),
+        else at_scale(arguments.find_maneuvers(command.maneuvers, car, command.suite), scale),
         policies=drives,
         platform=platform,
         car=car,
         out=command.out,
         arguments=tuple(words),
+        scale=scale_of(recorded) if recorded else scale,
         skipped=skipped,
         feel="feel" in command.metrics,
     )
@@ -221,7 +239,7 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
     """The results of an outcome, with what made them."""
     from ..evaluation.results import Provenance, Results
 
-    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata)
+    origin = Provenance.of(plan.arguments, plan.platform, plan.car, outcome.metadata, plan.scale)
     return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.skipped, notes=outcome.notes)
 
 

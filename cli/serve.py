@@ -16,7 +16,17 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import compilation_announced
 from ..envs.storage import check_file
 from . import arguments
-from .arguments import CarName, ManeuverName, Name, PlatformName, PolicyName, Whole, option, several
+from .arguments import (
+    CarName,
+    ManeuverName,
+    Name,
+    PlatformName,
+    PolicyName,
+    ScaleText,
+    Whole,
+    option,
+    several,
+)
 
 if TYPE_CHECKING:
     from ..envs.platform import Platform
@@ -45,6 +55,7 @@ class ServeCommand:
     rate: Whole = 1000
     """Set-points a second, a multiple of 100; the policy acts 100 times a second."""
     platform: PlatformName = "paper"
+    scale: ScaleText = "1"
     host: str = "127.0.0.1"
     """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
     port: Whole = DEFAULT_PORT
@@ -187,6 +198,7 @@ def _check(command: ServeCommand) -> None:
 
 
 def _made(command: ServeCommand) -> _Served:
+    from ..envs.cues import CueScale
     from ..realtime.controller import Controller, ControllerOptions
     from ..realtime.guard import GuardOptions
     from ..realtime.inbox import CueBounds, Inbox
@@ -204,7 +216,8 @@ def _made(command: ServeCommand) -> _Served:
         stuck=command.stuck,
         fade=command.fault_fade,
     )
-    options = ControllerOptions(rate=command.rate, watchdog=watchdog, guard=guard)
+    scale = CueScale.parse(command.scale)
+    options = ControllerOptions(rate=command.rate, watchdog=watchdog, guard=guard, scale=scale)
     peer = address_of(command.peer, 0) if command.peer else None
     bounds = CueBounds(command.max_force, command.max_vertical, command.max_angular_velocity)
     inbox = Inbox(make_format(command.format), watchdog.stale, watchdog.overdue, peer, bounds)

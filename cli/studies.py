@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from ..envs.progress import drives_progress
 from ..envs.storage import check_folder, check_own_json, write_bytes
@@ -27,6 +27,7 @@ from .arguments import (
     find_platform,
     find_platforms,
     find_policies,
+    several,
 )
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 class CompareCommand:
     """Drive maneuvers on several machines with several policies: how much machine does a controller need?
 
+    With several --scales each machine is driven at each, and J over that of standing still is shown.
     Drives that are done are kept in the output folder and not driven again.
     """
 
@@ -52,6 +54,8 @@ class CompareCommand:
     maneuvers: ManeuverNames = (ALL,)
     ablations: bool = False
     """Also each machine without its turntable, without its carriage, and with its hexapod alone."""
+    scales: Annotated[tuple[str, ...], several("SCALE ...")] = ("1",)
+    """Motion scales of the reference, each as `evaluate --scale` takes it."""
     car: CarName = "sedan"
     out: OutFolder = Path("comparison")
     fresh: Fresh = False
@@ -88,26 +92,30 @@ class RobustnessCommand:
 
 def run_compare(command: CompareCommand) -> int:
     """Compare; the exit status is 1 if a drive failed."""
+    from ..envs.cues import CueScale
     from ..evaluation.policies import make_policy
     from ..evaluation.reporting.text import words_of
     from ..evaluation.studies.figures import lines_figure
     from ..evaluation.studies.study import Condition
+    from ..evaluation.suite import at_scale
 
     machines = find_platforms(command.platforms, command.ablations)
     car = find_car(command.car)
     maneuvers = find_maneuvers(command.maneuvers, car)
     policies = find_policies(command.policies, next(iter(machines.values())))
     prepare(command.out, command.fresh)
+    scales = [CueScale.parse(text) for text in command.scales]
     conditions = [
         Condition(
-            name,
+            name if scale.neutral else f"{name} at {scale}",
             machine.description,
             machine,
             car,
-            maneuvers,
+            at_scale(maneuvers, scale),
             partial(make_policy, platform=machine, force=True),
         )
         for name, machine in machines.items()
+        for scale in dict.fromkeys(scales)
     ]
     return run_and_save(
         conditions,
@@ -117,6 +125,7 @@ def run_compare(command: CompareCommand) -> int:
         "How much machine does a controller need?",
         False,
         lines_figure,
+        still=any(not scale.neutral for scale in scales),
     )
 
 
@@ -190,6 +199,7 @@ def run_and_save(
     title: str,
     ratios: bool,
     figure: Callable[[StudyResults], Figure | None],
+    still: bool = False,
 ) -> int:
     """Drive a study, print its tables, write its files.
 
@@ -201,13 +211,14 @@ def run_and_save(
         title: Of the table of J.
         ratios: Whether J over that under the first condition stands in it.
         figure: Draws the study; None where there is nothing to draw.
+        still: Whether J over that of standing still is shown.
 
     Returns:
         Exit status: 1 if a drive failed.
     """
     from ..evaluation.reporting.figures import png
-    from ..evaluation.reporting.text import save_markdown, table_console
-    from ..evaluation.studies.results import matrix_table, print_study, score_tables
+    from ..evaluation.reporting.text import print_table, save_markdown, table_console
+    from ..evaluation.studies.results import matrix_table, print_study, score_tables, standstill_table
     from ..evaluation.studies.study import run_study
 
     count = sum(len(condition.maneuvers) for condition in conditions) * len(policies)
@@ -217,12 +228,16 @@ def run_and_save(
     results.save_json(out / "study.json")
     results.save_csv(out / "study.csv")
     skipped = [f"Skipped: {line}" for line in results.skipped_lines()]
-    save_markdown(out / "study.md", matrix_table(results, title, ratios), *score_tables(results), *skipped)
+    over_still = [standstill_table(results)] if still else []
+    tables = [matrix_table(results, title, ratios), *over_still, *score_tables(results)]
+    save_markdown(out / "study.md", *tables, *skipped)
     drawn = figure(results)
     if drawn is not None:
         write_bytes(out / "study.png", png(drawn))
     console = table_console()
     print_study(console, results, title, ratios)
+    for table in over_still:
+        print_table(console, table)
     console.print(
         f"{outcome.driven} of {count} drives driven now; everything is in {out}",
         highlight=False,

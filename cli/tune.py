@@ -15,6 +15,7 @@ from .arguments import (
     Fresh,
     Names,
     PlatformName,
+    ScaleText,
     Whole,
     Workers,
     find_car,
@@ -73,6 +74,7 @@ class TuneCommand:
     default: the set that is set by hand."""
     platform: PlatformName = "paper"
     car: CarName = "sedan"
+    scale: ScaleText = "1"
     workers: Workers = 1
     out: Annotated[Path | None, option("FILE.yaml")] = None
     """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json;
@@ -175,6 +177,7 @@ def _begun(command: TuneCommand) -> Record:
         "algorithm": algorithm_of(record.options.start),
         "platform": record.platform,
         "car": record.car,
+        "scale": str(record.options.scale),
         **{name: getattr(record.options, name) for name in _HELD},
     }
     for name, was in held.items():
@@ -190,6 +193,7 @@ def _begun(command: TuneCommand) -> Record:
 def _options(command: TuneCommand) -> TuningOptions:
     from ..baselines.tuning.search import TuningOptions
     from ..baselines.washout.families import FAMILIES, load_of
+    from ..envs.cues import CueScale
 
     given: dict[str, Any] = {"drives": command.drives, "budget": command.hours, "seed": command.seed}
     return TuningOptions(
@@ -198,6 +202,7 @@ def _options(command: TuneCommand) -> TuningOptions:
         method=command.method,
         limits=command.limits,
         maneuvers=command.maneuvers,
+        scale=CueScale.parse(command.scale),
         **{name: value for name, value in given.items() if value is not None},
     )
 
@@ -237,7 +242,7 @@ def _drives(options: TuningOptions, car: Car) -> list[CueTrace]:
             drives.append(source())
         except ValueError as error:
             raise DataError(f"maneuver {label}: {error}") from None
-    return drives
+    return [drive.scaled(options.scale) for drive in drives]
 
 
 def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
@@ -254,6 +259,8 @@ def _write(command: TuneCommand, search: Search, goes_on: bool) -> None:
     many = f"{drives} random drives" if options.maneuvers == ("train",) else ", ".join(options.maneuvers)
     spent = f"{search.status.hours:.3g} h"
     about = f"{options.start.name} tuned with {spent} by {how} for {goal} on {many}"
+    if not options.scale.neutral:
+        about += f", motion scale {options.scale}"
     tuned = search.result(name, about)
     notes = [
         f"{_MADE_BY}{search.command}" + (", stopped and resumed" if goes_on else ""),
@@ -290,6 +297,7 @@ def _held_out(search: Search) -> Objective:
 
     given, options = search.objective, search.options
     drives = random_drives(HELD_OUT, options.duration, HELD_OUT_SEED, drives=options.roads)
+    drives = [drive.scaled(options.scale) for drive in drives]
     return Objective(drives, given.platform, given.measure, given.threads, _spared(options, drives))
 
 

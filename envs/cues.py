@@ -15,8 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError, reason
+from .errors import ConfigurationError, DataError, reason
 from .limits import MOST_CELLS, MOST_COLUMNS, read_table_text
+from .settings import NonNegative, configuration
 from .storage import write_bytes, write_text
 
 Floats = NDArray[np.float64]
@@ -45,6 +46,87 @@ _TIME_TOLERANCE: Final = 1e-3
 """Largest deviation of a time step from the mean step, relative."""
 
 
+_Scales = tuple[NonNegative, NonNegative, NonNegative]
+
+_SCALED: Final[Mapping[str, tuple[int, ...]]] = {
+    "force": (0, 1, 2),
+    "rates": (3, 4, 5),
+    **{name: (k,) for k, name in enumerate(("x", "y", "z", "roll", "pitch", "yaw"))},
+}
+"""Entries of a scale by the names that stand for them."""
+
+
+@configuration
+class CueScale:
+    """Motion scale: the share of the car's cues that a simulator shall give, axis by axis.
+
+    Small motion bases are driven at a scale below 1, and 1 is judged too strong by many drivers (Gracio et
+    al.). A scaled reference is both the input of a policy and the reference of the cue error. Gravity is not
+    scaled.
+
+    Args:
+        force: Of specific force beyond gravity: x, y, z.
+        rates: Of angular velocity: roll, pitch, yaw.
+    """
+
+    force: _Scales = (1.0, 1.0, 1.0)
+    rates: _Scales = (1.0, 1.0, 1.0)
+
+    @classmethod
+    def parse(cls, text: str) -> CueScale:
+        """A scale from text: ``0.6``, or ``force=0.6,rates=0.5``; ``x y z roll pitch yaw`` name single axes.
+
+        Of several that name the same axis the last one counts.
+
+        Raises:
+            ConfigurationError: the text is neither.
+        """
+        values = [1.0] * 6
+        try:
+            for part in text.split(","):
+                name, equals, number = part.partition("=")
+                for k in _SCALED[name.strip()] if equals else range(6):
+                    values[k] = float(number if equals else name)
+        except (KeyError, ValueError):
+            raise ConfigurationError(
+                f"scale {text!r} is not understood; give a number such as 0.6, or one each of "
+                f"{', '.join(_SCALED)}, such as force=0.6,rates=0.5"
+            ) from None
+        return cls((values[0], values[1], values[2]), (values[3], values[4], values[5]))
+
+    def __str__(self) -> str:
+        """As :meth:`parse` takes it, the shortest form."""
+        values = (*self.force, *self.rates)
+        if len(set(values)) == 1:
+            return f"{values[0]:g}"
+        if len(set(self.force)) == len(set(self.rates)) == 1:
+            return f"force={self.force[0]:g},rates={self.rates[0]:g}"
+        return ",".join(f"{name}={value:g}" for name, value in zip([*_SCALED][2:], values, strict=True))
+
+    @property
+    def neutral(self) -> bool:
+        """Whether it leaves cues as they are."""
+        return self == UNSCALED
+
+    def of_force(self, force: Floats) -> Floats:
+        """Specific force (..., 3), m/s^2, with the part beyond gravity scaled."""
+        rest = np.array([0.0, 0.0, -GRAVITY])
+        return np.asarray(rest + np.array(self.force) * (force - rest))
+
+    def of_rates(self, rates: Floats) -> Floats:
+        """Angular velocity or acceleration (..., 3), scaled."""
+        return np.asarray(np.array(self.rates) * rates)
+
+    def times(self, other: CueScale) -> CueScale:
+        """Both, one after the other."""
+        force, rates = np.multiply(self.force, other.force), np.multiply(self.rates, other.rates)
+        return CueScale(tuple(force.tolist()), tuple(rates.tolist()))
+
+
+UNSCALED: Final = CueScale()
+"""The neutral scale, 1:1."""
+
+
 @dataclass(frozen=True, eq=False)
 class CueTrace:
     """Specific force and angular velocity of a car over time, at its cab's reference point (F_A).
@@ -59,6 +141,7 @@ class CueTrace:
         angular_acceleration: (n, 3) rad/s^2; central differences of the angular velocity if not given.
         channels: Further signals of the car, each (n,), such as ``speed_m_s``; never seen by a policy.
         source: Where the trace comes from, for reports.
+        scale: By which the cues have been scaled already, see :meth:`scaled`.
 
     Raises:
         DataError: a shape is wrong, a value is not finite, or time does not advance in equal steps.
@@ -71,6 +154,7 @@ class CueTrace:
     angular_acceleration: Floats = None  # type: ignore[assignment]  # filled below
     channels: Mapping[str, Floats] = field(default_factory=dict)
     source: str = ""
+    scale: CueScale = UNSCALED
 
     def __post_init__(self) -> None:
         time = _checked(self.name, "time", self.time, (None,))
@@ -125,6 +209,21 @@ class CueTrace:
         omega = self.angular_velocity
         tangential = np.cross(self.angular_acceleration, arm)
         return np.asarray(self.specific_force + tangential + np.cross(omega, np.cross(omega, arm)))
+
+    def scaled(self, scale: CueScale) -> CueTrace:
+        """The reference at a motion scale: the one place where a drive is scaled.
+
+        The channels stay: they are the car's. A neutral scale returns the trace itself.
+        """
+        if scale.neutral:
+            return self
+        return replace(
+            self,
+            specific_force=scale.of_force(self.specific_force),
+            angular_velocity=scale.of_rates(self.angular_velocity),
+            angular_acceleration=scale.of_rates(self.angular_acceleration),
+            scale=self.scale.times(scale),
+        )
 
     def resampled(self, dt: float) -> CueTrace:
         """The trace at another time step, by linear interpolation between samples.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from .comparison import common_drives
 from .metrics import CUE_AXES, METRICS, mean, over_drives
-from .reporting.tables import policy_table
+from .reporting.tables import at_scale, policy_table
 from .reporting.text import TextTable, how_many, save_markdown
 from .results import Results, save_frame
 
@@ -85,7 +85,7 @@ def benchmark_table(results: Results) -> TextTable:
     """Every policy over the suite, in the order of the benchmark; the best by J is stressed."""
     rows = benchmark(results)
     count = how_many(rows["maneuvers"].iloc[0] if len(rows) else 0, "drive")
-    return policy_table(f"Benchmark, means over {count}", rows, "benchmark")
+    return policy_table(f"Benchmark, means over {count}{at_scale(results)}", rows, "benchmark")
 
 
 def save_benchmark(results: Results, folder: Path) -> None:

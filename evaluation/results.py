@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 from pydantic import JsonValue
 from typing_extensions import Self
 
-from ..envs.errors import DataError, reason
+from ..envs.cues import UNSCALED, CueScale
+from ..envs.errors import ConfigurationError, DataError, reason
 from ..envs.limits import LARGEST_RESULTS, parse_json, read_bytes
 from ..envs.provenance import now, package_version, plain, versions
 from ..envs.settings import configuration, from_dict, renamed, to_dict
@@ -157,6 +158,20 @@ class Failure:
     message: str
 
 
+def check_same_scale(scales: Mapping[str, CueScale]) -> None:
+    """Refuse to compare results whose references have different motion scales.
+
+    Args:
+        scales: By the name of the results.
+
+    Raises:
+        ConfigurationError: two differ.
+    """
+    if len(set(scales.values())) > 1:
+        each = ", ".join(f"{name} has {scale}" for name, scale in scales.items())
+        raise ConfigurationError(f"results of different motion scales cannot be compared: {each}")
+
+
 @configuration
 class Provenance:
     """The origin of results.
@@ -168,6 +183,7 @@ class Provenance:
         platform: Name of the motion base.
         car: Name of the car.
         configuration: Everything in force: ``platform``, ``car``, and the metadata of each of ``policies``.
+        scale: Motion scale of the reference; results of different scales are not compared.
     """
 
     command: str
@@ -176,9 +192,17 @@ class Provenance:
     platform: str
     car: str
     configuration: dict[str, JsonValue]
+    scale: CueScale = UNSCALED
 
     @classmethod
-    def of(cls, words: Sequence[str], platform: Any, car: Any, policies: Mapping[str, Any]) -> Self:
+    def of(
+        cls,
+        words: Sequence[str],
+        platform: Any,
+        car: Any,
+        policies: Mapping[str, Any],
+        scale: CueScale = UNSCALED,
+    ) -> Self:
         """The origin of results that a command line makes now, with the metadata of each policy."""
         return cls(
             command=shlex.join(words),
@@ -191,6 +215,7 @@ class Provenance:
                 "car": plain(to_dict(car)),
                 "policies": plain(policies),
             },
+            scale=scale,
         )
 
 

@@ -30,7 +30,7 @@ from .trajectory import LimitTable, Trajectory
 
 Floats = NDArray[np.float64]
 
-_ABOUT: Final = ("parameters", "vestibular", "source")
+_ABOUT: Final = ("parameters", "vestibular", "source", "scale")
 """Metadata of every trajectory; the rest a policy counted."""
 
 
@@ -238,6 +238,7 @@ def trajectory_of(recording: Recording, run: Rollout, car: Car | None = None) ->
             "parameters": json.dumps({} if policy.parameters is None else to_dict(policy.parameters)),
             "vestibular": run.simulator.vestibular.name,
             "source": cues.source,
+            **({} if cues.scale.neutral else {"scale": str(cues.scale)}),
             **policy.statistics,
             **emergency_stops(states["limits"]),
         },

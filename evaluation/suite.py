@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 
-from ..envs.cues import CueTrace
+from ..envs.cues import CueScale, CueTrace
 from ..envs.errors import ConfigurationError, DataError, MotionCueingError, summary
 from .metrics import Criteria, Metrics, measure
 from .reporting.text import how_many, print_note
@@ -246,8 +246,35 @@ def cue_sources(drives: Mapping[str, Trajectory]) -> dict[str, CueSource]:
     return {label: partial(cues_of, drive, label) for label, drive in drives.items()}
 
 
+def scale_of(drives: Mapping[str, Trajectory]) -> CueScale:
+    """The motion scale of recorded drives; neutral without any.
+
+    Raises:
+        ConfigurationError: they have several.
+    """
+    scales = {label: drive.scale for label, drive in drives.items()}
+    if len(set(scales.values())) > 1:
+        each = ", ".join(f"{label} {scale}" for label, scale in scales.items())
+        raise ConfigurationError(f"the drives are at different motion scales ({each}); evaluate each apart")
+    return next(iter(scales.values()), CueScale())
+
+
+def at_scale(sources: Mapping[str, CueSource], scale: CueScale) -> dict[str, CueSource]:
+    """The cues of each drive at a motion scale."""
+    return {label: partial(_scaled, source, scale) for label, source in sources.items()}
+
+
+def _scaled(source: CueSource, scale: CueScale) -> CueTrace:
+    return source().scaled(scale)
+
+
 def cues_of(drive: Trajectory, name: str) -> CueTrace:
     """The reference cues of a drive."""
     return CueTrace(
-        name, drive.time, drive.f_reference, drive.w_reference, source=f"as driven by {drive.policy}"
+        name,
+        drive.time,
+        drive.f_reference,
+        drive.w_reference,
+        source=f"as driven by {drive.policy}",
+        scale=drive.scale,
     )

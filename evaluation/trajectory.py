@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..envs.cues import CueScale
 from ..envs.errors import DataError
 from ..envs.limits import parse_json, read_arrays
 from ..envs.platform.kernels import ACTUATORS
@@ -189,6 +190,11 @@ class Trajectory:
     def label(self) -> str:
         """Maneuver and policy, for messages."""
         return f"{self.maneuver}/{self.policy}"
+
+    @property
+    def scale(self) -> CueScale:
+        """Motion scale of its reference."""
+        return CueScale.parse(self.metadata.get("scale", "1"))
 
     @property
     def dt(self) -> float:

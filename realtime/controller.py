@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..baselines.interface import Interface, MachineInterface, Machines
 from ..baselines.policy import Policy, Wrapper, as_policy
-from ..envs.cues import CueTrace
+from ..envs.cues import UNSCALED, CueScale, CueTrace
 from ..envs.errors import ConfigurationError
 from ..envs.perception import get_vestibular_model
 from ..envs.platform import Platform
@@ -41,9 +41,14 @@ _CHUNK: Final = 6000
 
 
 class LoopLog:
-    """One row a time step: cues in use, accelerations, time the policy took, state of the controller."""
+    """One row a time step: cues in use, accelerations, time the policy took, state of the controller.
 
-    def __init__(self) -> None:
+    Args:
+        scale: Motion scale at which cues are logged.
+    """
+
+    def __init__(self, scale: CueScale = UNSCALED) -> None:
+        self._scale = scale
         self._chunks: list[NDArray[Any]] = []
         self._length = 0
 
@@ -98,7 +103,7 @@ class LoopLog:
         # The controller had the angular acceleration of the step before.
         change = np.diff(rate, axis=0, prepend=rate[:1]) / TIME_STEP
         time = np.asarray(TIME_STEP * np.arange(len(rows)), dtype=np.float64)
-        cues = CueTrace("loop", time, force, rate, change, source="in the loop")
+        cues = CueTrace("loop", time, force, rate, change, source="in the loop", scale=self._scale)
         machines = Machines([cues], [platform], None, get_vestibular_model(vestibular))
         run = Rollout(_Replay(as_policy(policy), rows["action"]), machines, start)
         steps = {f"loop_{state.name.lower()}": str(int((states == state).sum())) for state in State}
@@ -147,12 +152,14 @@ class ControllerOptions:
         watchdog: Its time limits.
         brake: How the machine brakes to neutral.
         guard: Which cues are believed.
+        scale: Motion scale: cues are scaled before the policy sees them, and are logged so.
     """
 
     rate: int = 1000
     watchdog: WatchdogOptions = WatchdogOptions()
     brake: BrakeOptions = BrakeOptions()
     guard: GuardOptions = GuardOptions()
+    scale: CueScale = UNSCALED
 
     def __post_init__(self) -> None:
         decisions = round(1.0 / TIME_STEP)
@@ -183,7 +190,8 @@ class Controller:
         self, machine: LiveMachine, platform: Platform, inbox: Inbox, options: ControllerOptions
     ) -> None:
         self.inbox, self._machine, self._options = inbox, machine, options.watchdog
-        self.state, self.log = State.NEUTRAL, LoopLog()
+        self._scale = options.scale
+        self.state, self.log = State.NEUTRAL, LoopLog(options.scale)
         self.faults: list[str] = []
         self.periods = 0
         self.guard = Guard(options.guard, options.watchdog.overdue)
@@ -275,6 +283,8 @@ class Controller:
         if inbox.newest is None:
             return AT_REST
         cues = self.guard(inbox.newest, inbox.paused, inbox.accepted)
+        if not self._scale.neutral:
+            cues = np.concatenate([self._scale.of_force(cues[:3]), self._scale.of_rates(cues[3:])])
         if not self.state.follows:
             return AT_REST
         if self.guard.follows:

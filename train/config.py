@@ -205,6 +205,7 @@ def validation_task(config: TrainingConfig) -> TaskOptions:
         library=given.drives,
         library_seed=given.seed,
         drive_duration=given.duration,
+        scale=config.task.episode.scale,
     )
     machines = RandomizationOptions(platform=ranges, platforms=given.drives)
     return replace(config.task, episode=episode, randomization=machines)

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from ...envs.cues import CueScale
 from ...envs.errors import ConfigurationError, DataError
 from ...envs.maneuvers import drive_seeds
 from ...envs.maneuvers.sampling import NamedDrives, load_drives
@@ -56,6 +57,7 @@ class TuningOptions:
         drives_seed: Seed of the random drives; the default is that of the agents' training.
         budget: Time to simulate, h.
         seed: Seed of every other draw.
+        scale: Motion scale of the drives.
     """
 
     start: AnyWashout
@@ -69,6 +71,7 @@ class TuningOptions:
     drives_seed: Count = 0
     budget: Positive = 1000.0
     seed: Count = 0
+    scale: CueScale = CueScale()
 
     def __post_init__(self) -> None:
         if self.method == "gradient" and self.objective != "J":

@@ -131,7 +131,7 @@ def fill_episodes(
 
 
 def cost_scales(drives: Sequence[CueTrace], options: RewardOptions) -> Floats:
-    """(n,) what rewards are divided by on each drive: 1 + ``standstill`` times J of standing still, a scale."""
+    """(n,) what rewards are divided by on each drive: 1 + ``standstill`` times J there, over the scale."""
     standing = np.array([standstill_cost(drive, options.zone) for drive in drives])
     return np.asarray((1.0 + options.standstill * standing) / options.scale)
 
@@ -234,7 +234,7 @@ def library_of(episode: EpisodeOptions, randomization: RandomizationOptions) -> 
         DataError: a car left the range of its model.
     """
     make = _named_drives if episode.drives else _random_drives
-    return tuple(make(episode, randomization))
+    return tuple(drive.scaled(episode.scale) for drive in make(episode, randomization))
 
 
 def platform_of(options: TaskOptions) -> Platform:

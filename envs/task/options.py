@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, Field
 
+from ..cues import CueScale
 from ..errors import ConfigurationError, suggest
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
 from ..maneuvers.sampling import NamedDrives
@@ -39,6 +40,11 @@ PositiveCount = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 
+def _scale_of(scale: object) -> object:
+    """A motion scale given as a number or as text."""
+    return CueScale.parse(str(scale)) if isinstance(scale, str | int | float) else scale
+
+
 @configuration
 class EpisodeOptions:
     """What is driven, from where to where.
@@ -54,6 +60,7 @@ class EpisodeOptions:
         random_start: Whether an episode begins anywhere in its drive that leaves ``duration`` to go.
         platform_offset: The machine begins anywhere within this share of its travel.
         terminate_on_failure: Whether an end of travel or a nearly singular pose ends an episode.
+        scale: Motion scale of the reference, as a policy sees it and as it is rewarded.
     """
 
     drives: tuple[str, ...] = ()
@@ -65,6 +72,7 @@ class EpisodeOptions:
     random_start: bool = False
     platform_offset: Share = 0.0
     terminate_on_failure: bool = False
+    scale: Annotated[CueScale, BeforeValidator(_scale_of)] = CueScale()
 
     def __post_init__(self) -> None:
         check_names("drive", self.drives, [*maneuver_names(None), *recording_names()])

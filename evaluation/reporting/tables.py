@@ -238,7 +238,7 @@ def _all_of(results: Results) -> str:
 
 
 def suite_table(results: Results) -> TextTable:
-    """The policies over the suite, best first."""
+    """The policies over the suite, best first; a motion scale other than 1 stands in the title."""
     scored = any(
         s.normalized_score is not None or s.perceived_normalized_score is not None for s in results.scores
     )
@@ -255,7 +255,13 @@ def suite_table(results: Results) -> TextTable:
     ]
     scores = SCORES.values() if scored else ()
     header = ("policy", "mean J", "mean perceived J", *scores, "best on", "worst maneuver")
-    return TextTable(_all_of(results), header, tuple(rows), (0,))
+    return TextTable(_all_of(results) + at_scale(results), header, tuple(rows), (0,))
+
+
+def at_scale(results: Results) -> str:
+    """The motion scale of results for a title; empty where it is neutral."""
+    scale = results.provenance.scale
+    return "" if scale.neutral else f", motion scale {scale}"
 
 
 def print_results(console: Console, results: Results, feel: bool = False) -> None:
@@ -267,9 +273,10 @@ def print_results(console: Console, results: Results, feel: bool = False) -> Non
         feel: Whether what people feel is shown, too.
     """
     for maneuver, drives in results.maneuvers.items():
-        print_table(console, maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)))
+        title, scores = maneuver + at_scale(results), results.normalized_scores.get(maneuver)
+        print_table(console, maneuver_table(title, drives, scores))
         if feel:
-            print_table(console, feel_table(maneuver, drives))
+            print_table(console, feel_table(title, drives))
     if results.scores:
         print_table(console, suite_table(results))
     for table in feel_tables(results) if feel else []:

@@ -13,7 +13,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from ...envs.settings import configuration, renamed
-from ..comparison import normalized_scores
+from ..comparison import STILL, normalized_scores
 from ..metrics import METRICS, Criteria, Metrics, over_drives
 from ..reporting.tables import SCORES, Cell, policy_table
 from ..reporting.text import NOTHING, TextTable, fraction, how_many, number, percent, print_note, print_table
@@ -219,6 +219,22 @@ def matrix_table(results: StudyResults, title: str, ratios: bool) -> TextTable:
         rows.append((policy, *cells))
     about = f"{title}: J, mean over {how_many(len(results.maneuvers), 'drive')}"
     return TextTable(about, ("policy", *results.conditions), tuple(rows))
+
+
+def standstill_table(results: StudyResults) -> TextTable:
+    """Mean J of every policy over that of standing still under the same condition; above 1 it is worse.
+
+    Standing still costs the square of the motion scale. So this is what compares scales; J is not.
+    """
+    still = results.across(STILL)
+    rows = []
+    for policy in results.driven:
+        cells = [
+            NOTHING if s is None or rest is None else f"{s.cue_error / rest.cue_error:.2f}"
+            for s, rest in zip(results.across(policy), still, strict=True)
+        ]
+        rows.append((policy, *cells))
+    return TextTable(f"J over that of {STILL}", ("policy", *results.conditions), tuple(rows))
 
 
 def score_tables(results: StudyResults) -> list[TextTable]:
