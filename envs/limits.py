@@ -163,14 +163,14 @@ class _Loader(yaml.SafeLoader):
         super().fetch_flow_collection_start(TokenClass)
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        event = self.peek_event()
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         anchor, before = getattr(event, "anchor", None), self._nodes
         self._depth += 1
         self._check(self._depth <= DEEPEST + 1, _DEEP)
         alias = isinstance(event, yaml.AliasEvent)
         if alias and anchor in self.anchors:
             self._check(anchor in self._sizes, f"{anchor!r} holds itself")
-        self._nodes += self._sizes.get(anchor, 1) if alias else 1
+        self._nodes += self._sizes.get(str(anchor), 1) if alias else 1
         self._check(self._nodes <= MOST_NODES, f"more than {MOST_NODES} values, those of aliases included")
         node = super().compose_node(parent, index)
         if anchor is not None and not alias:

@@ -289,7 +289,7 @@ def _steering(steers: list[Steer], car: Car, schedule: Schedule) -> Floats | Non
             continue
         speed = max(float(schedule.speed[inside[0]]), 5.0)
         amplitude = steer.severity * car.steering_wheel_for(speed, 0.3 * GRAVITY)
-        angle[inside] = amplitude * steer.wave(DT * np.arange(len(inside)))
+        angle[inside] = amplitude * steer.wave(np.asarray(DT * np.arange(len(inside)), dtype=np.float64))
     return angle if np.isfinite(angle).any() else None
 
 

@@ -273,7 +273,9 @@ def braking_stays_clear(hexapod: Hexapod) -> bool:
     poses, jacobian, clearance = poses[chosen], jacobian[chosen], clearance[chosen]
     beside = poses[:, None, :] + _DIFFERENCE * np.eye(6)
     slope = (_clearances(hexapod, beside)[2] - clearance[:, None]) / _DIFFERENCE
-    slope = np.linalg.solve(np.swapaxes(jacobian, -1, -2), slope[..., None])[..., 0]
+    slope = np.asarray(
+        np.linalg.solve(np.swapaxes(jacobian, -1, -2), slope[..., None])[..., 0], dtype=np.float64
+    )
     # Whole time steps may take half a step longer than the parabola of braking.
     stop = 0.5 * hexapod.velocity * (hexapod.velocity / hexapod.acceleration + _STEP)
     worst = np.argsort(clearance - stop * np.abs(slope).sum(axis=1))[:_WORST]

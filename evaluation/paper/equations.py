@@ -94,7 +94,7 @@ def high_passed(block: HighPass, values: Floats, dt: float) -> Floats:
 
 def high_passed_rates(p: WashoutParameters, t: Trajectory, motion: Motion) -> Floats:
     """(n, 3) beta1HP's rates: HPR of T_S omega_AA, Eq. (23), rad/s."""
-    inputs = np.linalg.solve(motion.from_rates, t.w_reference[:, :, None])[:, :, 0]
+    inputs: Floats = np.asarray(np.linalg.solve(motion.from_rates, t.w_reference[:, :, None])[:, :, 0], float)
     lag = signal.bilinear([1.0], [1.0 / p.rate_bandwidth, 1.0], 1.0 / t.dt)
     return np.column_stack(
         [signal.lfilter(*lag, high_passed(p.hpr[k], inputs[:, k], t.dt)) for k in range(3)]
