@@ -162,6 +162,12 @@ def _restarted(rows: Rows, at: int) -> list[Sent]:
     return sent
 
 
+def _into_braking(rows: Rows, at: int) -> list[Sent]:
+    """Three seconds of full braking come between: another drive."""
+    braking = cues_of(get_maneuver("braking").drive())[0][9 * RATE : 12 * RATE]
+    return _stream(_inserted(rows, at, braking))
+
+
 SECOND: Final = RATE
 FAULTS: Final[dict[str, Fault]] = {
     "none": lambda c, at, r: _stream(c),
@@ -180,6 +186,8 @@ FAULTS: Final[dict[str, Fault]] = {
     "reset to standing": lambda c, at, r: _stream(_changed(c, at, np.tile(AT_REST, (len(c) - at, 1)))),
     "teleport to 2 s later": lambda c, at, r: _stream(_inserted(c, at, c[:0], 2 * SECOND)),
     "teleport to 2 s before": lambda c, at, r: _stream(_inserted(c, at, c[at - 2 * SECOND :], len(c))),
+    "teleport into braking": lambda c, at, r: _into_braking(c, at),
+    "offset of 8 m/s^2 for 5 s": lambda c, at, r: _stream(_added(c, at, 5.0, (0, 8, 0, 0, 0, 0))),
     "force frozen for 3 s": lambda c, at, r: _frozen(c, at, 3.0),
     "a third are copies": lambda c, at, r: _copies(c, r.random(len(c)) < 1 / 3),
     "packets repeated": lambda c, at, r: [s for s in _stream(c) for _ in range(2)],

@@ -185,11 +185,11 @@ def air_drag(car: CarParameters, speed: real) -> real:
 
 
 @wp.func
-def normal_gravity(command: Commands, speed: real) -> real:
-    """(C6) Gravity and the centripetal acceleration of crests and dips, normal to the road, m/s^2."""
-    return (
-        real(GRAVITY) * wp.cos(command.grade) * wp.cos(command.bank) + command.grade_per_meter * speed * speed
-    )
+def normal_gravity(command: Commands, speed: real, yaw_rate: real) -> real:
+    """(C6) Gravity and the centripetal acceleration normal to the road, m/s^2: of crests, dips and banks."""
+    gravity = real(GRAVITY) * wp.cos(command.grade) * wp.cos(command.bank)
+    turning = command.grade_per_meter * speed * speed + wp.tan(command.bank) * yaw_rate * speed
+    return gravity + turning
 
 
 @wp.func
@@ -224,9 +224,9 @@ def front_share(car: CarParameters, load: vec2) -> real:
 
 
 @wp.func
-def most_resistance(car: CarParameters, brake: real, command: Commands, speed: real) -> real:
+def most_resistance(car: CarParameters, brake: real, command: Commands, speed: real, yaw_rate: real) -> real:
     """Largest resisting force of brakes (ideal anti-lock: never beyond friction) and rolling, N."""
-    gravity = normal_gravity(command, speed)
+    gravity = normal_gravity(command, speed, yaw_rate)
     load = axle_loads(car, gravity, -brake)
     share = front_share(car, load)
     front = wp.min(brake * share, usable_grip(car, load[0]))
@@ -303,7 +303,8 @@ def tire_forces(car: CarParameters, state: State, command: Commands) -> Forces:
     u, r = state[FORWARD], state[YAW_RATE]
     delta = state[WHEEL] / car.ratio
     c, s = wp.cos(delta), wp.sin(delta)
-    load = axle_loads(car, normal_gravity(command, u), state[DRIVE] + command.driveline - command.resistance)
+    traction = state[DRIVE] + command.driveline - command.resistance
+    load = axle_loads(car, normal_gravity(command, u, r), traction)
     share = front_share(car, load)
     front = front_axle(car, load[0], share, state, command)
     rear = rear_axle(car, load[1], share, state, command)
@@ -328,7 +329,7 @@ def derivative(car: CarParameters, state: State, command: Commands) -> State:
     """Equations of motion (C9) to (C12): the state's time derivative."""
     u, v, r = state[FORWARD], state[LATERAL], state[YAW_RATE]
     forces = tire_forces(car, state, command)
-    moments = body_moments(car, state, normal_gravity(command, u))
+    moments = body_moments(car, state, normal_gravity(command, u, r))
 
     # (C10) The body's roll and pitch accelerations react on the car's. The slope's share of gravity acts on
     # every mass alike, so that it drops out of the coupling.
@@ -378,7 +379,7 @@ def resist(car: CarParameters, deflection: real, state: State, command: Commands
     Sliding, it gives its full force; standing, it is a damped spring, so that a stop ends with a jerk, does
     not chatter, and a slope is held. Returns the new deflection, m, and the force, N.
     """
-    most = most_resistance(car, state[BRAKE], command, state[FORWARD])
+    most = most_resistance(car, state[BRAKE], command, state[FORWARD], state[YAW_RATE])
     stiffness = car.mass * car.standstill_stiffness
     limit = most / stiffness
     after = limited(deflection + state[FORWARD] * dt, limit)
@@ -540,8 +541,10 @@ def cues(car: CarParameters, state: State, rate: State, slope: Slope) -> Cue:
     turn = road_to_body(state[ROLL], state[PITCH])
 
     # The road's frame yaws with the car, pitches with the slope and rolls with the bank.
-    tilt = slope.per_meter * u
-    tilting = slope.per_square_meter * u * u + slope.per_meter * rate[FORWARD]
+    # A turn is about the vertical: on a bank part of it is about the road's lateral axis.
+    across = wp.tan(slope.bank)
+    tilt = slope.per_meter * u + across * r
+    tilting = slope.per_square_meter * u * u + slope.per_meter * rate[FORWARD] + across * rate[YAW_RATE]
     lean = slope.bank_per_meter * u
     leaning = slope.bank_per_square_meter * u * u + slope.bank_per_meter * rate[FORWARD]
     carried = turn * vec3(lean, tilt, r)

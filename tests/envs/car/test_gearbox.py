@@ -128,5 +128,8 @@ def test_a_bank_takes_the_side_force_off_the_driver():
     assert flat.specific_force[-1, 1] == pytest.approx(speed**2 / radius, rel=0.12)
     assert abs(banked.specific_force[-1, 1]) < 0.08 * flat.specific_force[-1, 1]
     assert np.abs(banked.channels["path_offset_m"]).max() < 0.3
+    # The turn presses the car into the bank.
+    pressed = GRAVITY * np.cos(angle) + speed**2 / radius * np.sin(angle)
+    assert banked.specific_force[-1, 2] == pytest.approx(-pressed, rel=0.015)
     # The bank's roll is felt: its integral is the bank, right side down.
     assert 0.01 * banked.angular_velocity[:, 0].sum() == pytest.approx(angle, rel=0.05)
