@@ -8,6 +8,7 @@ from typing import Annotated, Final
 
 import numpy as np
 from pydantic import BeforeValidator, Field
+from scipy.ndimage import uniform_filter1d
 
 from ..car.plans import DT, STEP, Path, Schedule
 from ..car.simulation import Plan, RoadRoughness, simulate
@@ -303,6 +304,10 @@ def _shortest_time(road: Road) -> float:
     )
 
 
+_BANKING: Final = 31
+"""Points over which a bank is averaged, twice."""
+
+
 def _bank(road: Road, points: int) -> Floats | None:
     """Cross slope of the road, rad; None where it is level."""
     if road.circuit is None:
@@ -310,7 +315,8 @@ def _bank(road: Road, points: int) -> Floats | None:
     bank = np.zeros(points)
     for first in road.laps:
         bank[first : first + len(road.circuit.bank)] = road.circuit.bank
-    return bank
+    # The road to the circuit is level: a lap may begin at the end of a banked corner.
+    return np.asarray(uniform_filter1d(uniform_filter1d(bank, _BANKING), _BANKING))
 
 
 def _slope(road: Road, points: int) -> Floats:
