@@ -22,7 +22,9 @@ import yaml
 
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import MotionCueingError
-from motion_cueing.envs.logs.signals import FORCES, RATES, read_log
+from motion_cueing.envs.logs.proposal import propose
+from motion_cueing.envs.logs.readers.registry import read_recording
+from motion_cueing.envs.logs.units import FORCES, RATES
 from motion_cueing.envs.platform.presets import get_platform, load_platform
 from motion_cueing.envs.settings import to_dict
 from motion_cueing.evaluation.trajectory import Trajectory
@@ -149,7 +151,7 @@ def _log() -> bytes:
 
 
 def _read_log(path: Path) -> Any:
-    return read_log(path, {name: name for name in ("time", *FORCES, *RATES)}, {})
+    return propose(read_recording(path))
 
 
 @cache

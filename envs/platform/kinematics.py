@@ -30,6 +30,10 @@ NEIGHBORHOOD: Final = 0.35
 _STEP: Final = 0.01
 """Time step at which a geometry must stay clear of singular poses, s."""
 
+_FASTEST: Final = 2.0
+"""Leg speed for which that must hold at most, m/s: real legs are slower. Machines without limits, as studies
+use them, are faster; where their pose does not close the legs stop."""
+
 _CORNERS: Final = np.array(list(product((-1.0, 1.0), repeat=6)))
 """Every combination of the ways that six legs go."""
 
@@ -213,8 +217,8 @@ def check_geometry(hexapod: Hexapod) -> None:
     if not _is_clear_for_a_step(hexapod):
         raise GeometryError(
             f"the hexapod reaches a singular pose within {_STEP:g} s of neutral when its legs move at "
-            f"{hexapod.velocity:g} m/s, so no limit keeps it away: move upper_joints, lower_joints or "
-            "neutral so that the legs lie less alike, or lower hexapod.velocity"
+            f"{min(hexapod.velocity, _FASTEST):g} m/s, so no limit keeps it away: move upper_joints, "
+            "lower_joints or neutral so that the legs lie less alike, or lower hexapod.velocity"
         )
 
 
@@ -250,7 +254,7 @@ def _clearance_after(hexapod: Hexapod, start: Floats, way: Floats) -> Floats:
 @lru_cache(maxsize=4096)
 def _is_clear_for_a_step(hexapod: Hexapod) -> bool:
     """Whether legs at full speed, in every combination of ways, are at clear poses after a time step."""
-    step = hexapod.velocity * _STEP
+    step = min(hexapod.velocity, _FASTEST) * _STEP
     way = np.clip(step * _CORNERS, *hexapod.extension)
     return bool(_clearance_after(hexapod, np.zeros_like(way), way).min() >= NEARLY_SINGULAR)
 

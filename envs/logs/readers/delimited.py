@@ -15,6 +15,7 @@ import pandas as pd
 
 from ...cues import Floats
 from ...errors import DataError, reason
+from ...limits import LARGEST_TABLE, MOST_COLUMNS, read_bytes
 from ..signals import Change, ImportOptions
 from ..units import known_unit
 from .recording import Column, Reader, Recording, Table, bracketed_unit
@@ -67,7 +68,7 @@ def read_delimited(path: Path, options: ImportOptions) -> Recording:
         DataError: the file cannot be read, holds no table, or is damaged and the options refuse that.
     """
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, LARGEST_TABLE)
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     return parse(content, str(path), options)
@@ -99,6 +100,8 @@ def parse(content: bytes, path: str, options: ImportOptions) -> Recording:
         raise DataError(f"{path}: no rows of numbers; expected a table of text, such as CSV")
     names, units, preamble = _header(rows, first, dialect)
     data = _whole_rows(rows[first:], len(names), dialect, names, path, options, changes)
+    if len(names) > MOST_COLUMNS:
+        raise DataError(f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read")
     columns = tuple(
         _column(name, unit, [(line, row[place].strip()) for line, row in data], dialect, path)
         for place, (name, unit) in enumerate(zip(names, units, strict=True))
@@ -125,7 +128,7 @@ def _unpacked(content: bytes) -> tuple[bytes, str]:
     while content[:2] == b"\x1f\x8b":
         machine = zlib.decompressobj(wbits=31)
         try:
-            parts.append(machine.decompress(content))
+            parts.append(machine.decompress(content, LARGEST_TABLE))
         except zlib.error as error:
             fault = f"cannot be read: the packed file is damaged ({error})"
             break

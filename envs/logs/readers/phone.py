@@ -5,12 +5,14 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Final
 
 import numpy as np
 
 from ...errors import DataError, reason
+from ...limits import LARGEST_TABLE, MIB, read_bytes
 from ..signals import Change, ImportOptions
 from .delimited import parse
 from .recording import Column, Reader, Recording, Table
@@ -103,9 +105,14 @@ def _members(path: Path) -> Iterable[tuple[str, Callable[[], bytes]]]:
     """Name and reader of each CSV file at the top of a folder or a zip file."""
     try:
         if path.is_dir():
-            return [(file.name, file.read_bytes) for file in sorted(path.glob("*.csv"))]
+            return [
+                (file.name, partial(read_bytes, file, LARGEST_TABLE)) for file in sorted(path.glob("*.csv"))
+            ]
         with zipfile.ZipFile(path) as archive:
-            files = {name: archive.read(name) for name in archive.namelist() if _is_sensor(name)}
+            members = [member for member in archive.infolist() if _is_sensor(member.filename)]
+            if sum(member.file_size for member in members) > LARGEST_TABLE:
+                raise DataError(f"{path}: larger than {LARGEST_TABLE / MIB:g} MiB unpacked")
+            files = {member.filename: archive.read(member) for member in members}
         return [(name, lambda name=name: files[name]) for name in files]  # type: ignore[misc]
     except (OSError, zipfile.BadZipFile) as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import DataError, reason
+from ...limits import LARGEST_TABLE, read_bytes
 from ..signals import Change, ImportOptions
 from .recording import Column, Reader, Recording, Table
 
@@ -32,7 +33,7 @@ def read_vbo(path: Path, options: ImportOptions) -> Recording:
         DataError: a section is missing, or a line is damaged and the options refuse that.
     """
     try:
-        text = path.read_bytes().decode("utf-8", errors="replace")
+        text = read_bytes(path, LARGEST_TABLE).decode("utf-8", errors="replace")
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({reason(error)})") from None
     sections: dict[str, list[tuple[int, str]]] = {}
