@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -59,10 +61,10 @@ def test_an_error_names_the_policy():
 def test_batches_hold_every_drive_once_those_of_similar_length_together():
     drives = {f"{k}": trace(0.1 + 0.01 * k) for k in range(40)}
     groups = batches(NoMotion(), drives)
-    assert sorted(sum(groups, [])) == sorted(drives)
+    assert sorted(name for group in groups for name in group) == sorted(drives)
     assert len(groups) == 3
     spans = [[drives[name].duration for name in group] for group in groups]
-    assert all(min(longer) >= max(shorter) for longer, shorter in zip(spans, spans[1:], strict=False))
+    assert all(min(longer) >= max(shorter) for longer, shorter in pairwise(spans))
 
 
 def test_a_policy_that_knows_its_drive_or_promised_nothing_drives_alone():
