@@ -122,5 +122,5 @@ def _profiles(axes: Axes, results: BenchmarkResults, platform: str, split: str, 
     axes.set_ylim(0.0, 1.02)
     axes.set_xlim(_THRESHOLDS[0], _THRESHOLDS[-1])
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0%}"))
-    if split == results.splits[-1].name:
+    if split == results.splits[-1].name and axes.lines:
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8)
