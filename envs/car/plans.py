@@ -29,6 +29,8 @@ class Path:
         curvature: Positive in a right bend, 1/m.
         grade: Slope, rad, positive uphill.
         grade_per_meter: Derivative of the slope along the path, rad/m.
+        bank: Cross slope, rad, right side down positive; level if None.
+        bank_per_meter: Derivative of the cross slope along the path, rad/m.
     """
 
     x: Floats
@@ -37,6 +39,8 @@ class Path:
     curvature: Floats
     grade: Floats
     grade_per_meter: Floats
+    bank: Floats | None = None
+    bank_per_meter: Floats | None = None
 
     def __post_init__(self) -> None:
         table = self.table()
@@ -52,33 +56,40 @@ class Path:
         return STEP * (len(self) - 1)
 
     def table(self) -> Floats:
-        """(n, 6) all columns, in the order of the fields."""
+        """(n, 8) all columns, in the order of the fields."""
+        level = np.zeros_like(self.x)
+        bank = level if self.bank is None else self.bank
+        leaning = level if self.bank_per_meter is None else self.bank_per_meter
         columns = (self.x, self.y, self.heading, self.curvature, self.grade, self.grade_per_meter)
-        return np.column_stack(columns)
+        return np.column_stack((*columns, bank, leaning))
 
     def delayed(self, distance: float) -> Path:
         """The same path after a straight of about ``distance`` meters (a whole number of steps)."""
         points = STEP * np.arange(-round(distance / STEP), 0)
         zero = np.zeros_like(points)
         c, s = np.cos(self.heading[0]), np.sin(self.heading[0])
-        before = (self.x[0] + points * c, self.y[0] + points * s, zero + self.heading[0], zero, zero, zero)
+        before = (self.x[0] + points * c, self.y[0] + points * s, zero + self.heading[0], *[zero] * 5)
         columns = [np.concatenate((new, old)) for new, old in zip(before, self.table().T, strict=True)]
         return Path(columns[0] - columns[0][0], *columns[1:])
 
     @classmethod
-    def of_curvature(cls, curvature: ArrayLike, grade: ArrayLike = 0.0) -> Path:
-        """The path with curvatures (n,), 1/m, and slopes (n,), rad, every :data:`STEP`; along x at first."""
+    def of_curvature(
+        cls, curvature: ArrayLike, grade: ArrayLike = 0.0, bank: ArrayLike | None = None
+    ) -> Path:
+        """The path with curvatures (n,), 1/m, slopes and cross slopes (n,), rad, every :data:`STEP`.
+
+        It begins along x.
+        """
         kappa = np.asarray(curvature, dtype=np.float64)
-        change = np.gradient(np.broadcast_to(np.asarray(grade, dtype=np.float64), kappa.shape), STEP)
-        # The slope is the exact integral of its (piecewise linear) derivative, as the kernel reads it.
-        slope = np.ravel(grade)[0] + _integral(change)
+        slope, change = _slope_of(grade, kappa)
         heading = _integral(kappa)
         # Exact for an arc: the chord has the mean heading, and sinc(dpsi / 2) of the arc's length.
         middle, turn = 0.5 * (heading[1:] + heading[:-1]), np.diff(heading)
         chord = STEP * np.sinc(turn / (2.0 * np.pi)) * np.cos(0.5 * (slope[1:] + slope[:-1]))
         x = np.concatenate(([0.0], np.cumsum(chord * np.cos(middle))))
         y = np.concatenate(([0.0], np.cumsum(chord * np.sin(middle))))
-        return cls(x, y, heading, kappa, slope, change)
+        lean = (None, None) if bank is None else _slope_of(bank, kappa)
+        return cls(x, y, heading, kappa, slope, change, *lean)
 
     @classmethod
     def of_offset(cls, x: Floats, y: Floats) -> Path:
@@ -120,6 +131,15 @@ def smooth_steps(stations: Floats, knots: ArrayLike, values: Sequence[float]) ->
     blend = 0.5 - 0.5 * np.cos(np.pi * (index - below))
     level = np.asarray(values, dtype=np.float64)
     return np.asarray(level[below] + (level[below + 1] - level[below]) * blend)
+
+
+def _slope_of(slope: ArrayLike, points: Floats) -> tuple[Floats, Floats]:
+    """A slope (n,), rad, and its derivative, rad/m.
+
+    The slope is the exact integral of its (piecewise linear) derivative, as the kernel reads it.
+    """
+    change = np.gradient(np.broadcast_to(np.asarray(slope, dtype=np.float64), points.shape), STEP)
+    return np.ravel(slope)[0] + _integral(change), change
 
 
 def _integral(values: Floats) -> Floats:

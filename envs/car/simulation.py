@@ -14,15 +14,28 @@ from typing import Any, Final
 
 import numpy as np
 import warp as wp
-from scipy.signal import cont2discrete, lfilter, ss2tf
+from numpy.typing import NDArray
+from scipy.signal import butter, cont2discrete, lfilter, sosfilt, ss2tf
 
-from ..arrays import FLOAT, vec6
+from ..arrays import FLOAT, real
 from ..cues import GRAVITY, CueTrace
 from ..errors import DataError
-from .kernels.driver import COLUMNS, SUBSTEPS, Driver, DriverParameters, Row, Task, drive_all, vec4
-from .kernels.vehicle import CarParameters
+from .kernels.driver import (
+    COLUMNS,
+    MEMORY,
+    ROBOT_LAG,
+    SUBSTEPS,
+    Driver,
+    DriverParameters,
+    PathRow,
+    Row,
+    ScheduleRow,
+    Task,
+    drive_all,
+)
+from .kernels.vehicle import CarParameters, vec16
 from .plans import DT, Floats, Path, Schedule, clothoids
-from .vehicles import Car
+from .vehicles import MOST_GEARS, Car
 
 SPACING: Final = 0.1
 """Between the points of a track, m: what a tire levels out."""
@@ -47,10 +60,12 @@ class RoadRoughness:
     Args:
         left: (n,) of the left track.
         right: (n,) of the right one.
+        harshness: Share of the wheels' speed that the dampers pass on to the body, 0 to 1.
     """
 
     left: Floats
     right: Floats
+    harshness: float = 0.0
 
     @classmethod
     def drawn(cls, roughness: float, length: float, rng: np.random.Generator) -> RoadRoughness:
@@ -103,14 +118,14 @@ def shaking(car: Car, road: RoadRoughness, distance: Floats, dt: float) -> Shaki
         (left - right) / (_TRACK * car.width),
     )
 
-    body = car.suspension
+    body, passed = car.suspension, road.harshness
     weight = body.sprung_mass * GRAVITY * body.arm
-    _, _, up = _sprung(heave, *_HEAVE, dt)
+    _, _, up = _sprung(heave, *_HEAVE, dt, passed)
     phi, p, p_dot = _sprung(
-        roll, *_mode(body.roll_stiffness - weight, body.roll_damping, body.roll_inertia), dt
+        roll, *_mode(body.roll_stiffness - weight, body.roll_damping, body.roll_inertia), dt, passed
     )
     theta, q, q_dot = _sprung(
-        pitch, *_mode(body.pitch_stiffness - weight, body.pitch_damping, body.pitch_inertia), dt
+        pitch, *_mode(body.pitch_stiffness - weight, body.pitch_damping, body.pitch_inertia), dt, passed
     )
     zero = np.zeros_like(distance)
     rate_derivative = np.column_stack((p_dot, q_dot, zero))
@@ -127,23 +142,36 @@ def _mode(stiffness: float, damping: float, inertia: float) -> tuple[float, floa
     return frequency, damping / (2.0 * inertia * frequency)
 
 
-def _sprung(base: Floats, frequency: float, ratio: float, dt: float) -> tuple[Floats, Floats, Floats]:
+def _sprung(
+    base: Floats, frequency: float, ratio: float, dt: float, passed: float = 0.0
+) -> tuple[Floats, Floats, Floats]:
     """A body's motion, its rate and acceleration on a spring whose other end moves as ``base`` (n,).
 
-    y'' = w^2 (u - y) - 2 z w y', from rest, exact for a base that moves evenly between samples. The damper's
-    other end stands still: what it would pass on of waves shorter than a car, recordings do not hold either.
+    y'' = w^2 (u - y) + 2 z w (k u' - y'), from rest, exact for a base that moves evenly between samples, with
+    k the share ``passed``: waves shorter than a car are for the most part leveled out by tires and bushings,
+    and an axle that hops follows only to :data:`_HOP`.
     """
-    a = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * ratio * frequency]])
-    b = np.array([[0.0], [frequency**2]])
-    c = np.vstack((np.eye(2), a[1]))
-    d = np.array([[0.0], [0.0], [frequency**2]])
-    numerators, denominator = ss2tf(*cont2discrete((a, b, c, d), dt, method="foh")[:4])
     offset = base - base[0]
+    if passed > 0.0:
+        offset = np.asarray(sosfilt(butter(2, _HOP, fs=1.0 / dt, output="sos"), offset))
+    damping = 2.0 * ratio * frequency
+    # With q = y' - 2 z w k u the derivative of the base is not needed.
+    a = np.array([[0.0, 1.0], [-(frequency**2), -damping]])
+    b = np.array([[passed * damping], [frequency**2 - passed * damping**2]])
+    c = np.vstack((np.eye(2), a[1]))
+    d = np.array([[0.0], [passed * damping], [frequency**2 - passed * damping**2]])
+    numerators, denominator = ss2tf(*cont2discrete((a, b, c, d), dt, method="foh")[:4])
     y, rate, acceleration = (lfilter(n, denominator, offset) for n in numerators)
+    if passed > 0.0:
+        acceleration = acceleration + passed * damping * np.gradient(offset, dt)
     return y, rate, acceleration
 
 
-ROBOT: Final = Driver(hand_lag=0.02)
+_HOP: Final = 10.0
+"""Frequency up to which a wheel follows the road and hands its speed to the damper, Hz."""
+
+
+ROBOT: Final = Driver(hand_lag=ROBOT_LAG)
 """A steering robot: keeps the speed as a driver does, and turns the wheel as told, within 20 ms."""
 
 _SPEED: Final = COLUMNS.index("speed_m_s")
@@ -159,10 +187,12 @@ class Plan:
         path: The line to follow.
         schedule: The speed over time.
         steering: (n,) steering-wheel angles, rad, instead of following the path; one a sample of the
-            schedule.
+            schedule. NaN where the driver follows the path: the driver then goes on from where the car is,
+            and the rest of the path lies there.
         driver: Who drives; the default driver, or a :data:`ROBOT` where ``steering`` is given.
         roughness: Of the road; None for a smooth one.
         source: For reports.
+        seed: Of the driver's errors by chance.
     """
 
     name: str
@@ -173,19 +203,27 @@ class Plan:
     driver: Driver | None = None
     roughness: RoadRoughness | None = None
     source: str = field(default="")
+    seed: tuple[int, ...] = (0,)
 
     def __post_init__(self) -> None:
         if self.steering is None:
             return
-        if self.steering.shape != self.schedule.speed.shape or not np.isfinite(self.steering).all():
+        if self.steering.shape != self.schedule.speed.shape or not np.isfinite(self.steering).any():
             raise DataError(f"{self.name}: steering must be {len(self.schedule)} finite angles, one a sample")
+
+    @property
+    def follows(self) -> NDArray[np.bool_]:
+        """(n,) whether the driver follows the path."""
+        if self.steering is None:
+            return np.ones(len(self.schedule), dtype=bool)
+        return np.isnan(self.steering)
 
     @property
     def chosen_driver(self) -> Driver:
         """The driver, or the default one for this kind of plan."""
         if self.driver is not None:
             return self.driver
-        return Driver() if self.steering is None else ROBOT
+        return Driver() if self.follows.any() else ROBOT
 
 
 def straight(length: float = 1.0) -> Path:
@@ -200,7 +238,8 @@ def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
         One trace a plan, sampled at 100 Hz, at the origin of F_A, with the channels
         :data:`~.drive_kernel.COLUMNS`: accelerations are those of the point of the roll axis under the c.g.,
         in the road's frame; ``path_offset_m`` is the distance to the right of the path; throttle and brake
-        are shares. On a rough road its shaking is added to all three cues.
+        are shares; ``gear`` is there for cars that have a gearbox. On a rough road its shaking is added to
+        all three cues.
 
     Raises:
         DataError: the car left the range of the model (a plan no car can follow).
@@ -214,7 +253,7 @@ def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
 
 def _launch(plans: Sequence[Plan], device: str) -> Floats:
     tasks = _tasks(plans)
-    cars = [fill(CarParameters(), plan.car) for plan in plans]
+    cars = [_parameters(plan.car) for plan in plans]
     drivers = [fill(DriverParameters(), plan.chosen_driver) for plan in plans]
     schedule = np.concatenate([_schedule_rows(plan) for plan in plans])
     paths = np.concatenate([plan.path.table() for plan in plans])
@@ -223,8 +262,9 @@ def _launch(plans: Sequence[Plan], device: str) -> Floats:
         wp.array(cars, dtype=CarParameters, device=device),
         wp.array(drivers, dtype=DriverParameters, device=device),
         wp.array(tasks, dtype=Task, device=device),
-        wp.array(paths.astype(FLOAT), dtype=vec6, device=device),
-        wp.array(schedule.astype(FLOAT), dtype=vec4, device=device),
+        wp.array(paths.astype(FLOAT), dtype=PathRow, device=device),
+        wp.array(schedule.astype(FLOAT), dtype=ScheduleRow, device=device),
+        wp.zeros((len(plans), MEMORY), dtype=real, device=device),
     ]
     wp.launch(drive_all, len(plans), inputs=[*inputs, SUBSTEPS], outputs=[result], device=device)
     return np.asarray(result.numpy(), dtype=np.float64)
@@ -236,17 +276,61 @@ def _tasks(plans: Sequence[Plan]) -> list[Any]:
         task = Task()
         task.path_start, task.path_points = path_start, len(plan.path)
         task.first, task.samples = first, len(plan.schedule)
-        task.open_loop = int(plan.steering is not None)
+        task.open_loop = int(not plan.follows.any())
         tasks.append(task)
         path_start += len(plan.path)
         first += len(plan.schedule)
     return tasks
 
 
+def _parameters(car: Car) -> Any:
+    """The kernel's numbers of a car; gearbox and stability control are none where the car has none."""
+    parameters = fill(CarParameters(), car)
+    if car.gearbox is not None:
+        ratios = car.gearbox.ratios
+        parameters.gears = len(ratios)
+        parameters.gear_ratios = vec16(*ratios, *[ratios[-1]] * (MOST_GEARS - len(ratios)))
+    return parameters
+
+
 def _schedule_rows(plan: Plan) -> Floats:
-    steering = np.zeros(len(plan.schedule)) if plan.steering is None else plan.steering
-    schedule = plan.schedule
-    return np.column_stack((schedule.speed, schedule.acceleration, schedule.distance, steering))
+    schedule, follows = plan.schedule, plan.follows
+    steering = np.zeros(len(schedule)) if plan.steering is None else np.where(follows, 0.0, plan.steering)
+    rows = np.column_stack((schedule.speed, schedule.acceleration, schedule.distance, steering, ~follows))
+    return np.hstack((rows, errors_of(plan.chosen_driver, len(schedule), plan.seed)))
+
+
+def errors_of(driver: Driver, samples: int, seed: tuple[int, ...]) -> Floats:
+    """(n, 3) errors of a driver by chance: of the line, m, of the wheel, rad, of the acceleration, m/s^2.
+
+    Gaussian, filtered twice by first-order low-passes: line and acceleration with the driver's
+    ``wander_time``, the wheel with :data:`TREMBLING`. They begin at zero.
+    """
+    if not driver.errs:
+        return np.zeros((samples, 3))
+    rng = np.random.default_rng(seed)
+    spreads = (driver.lane_wander, driver.steering_noise, driver.pedal_noise)
+    times = (driver.wander_time, TREMBLING, 0.5 * driver.wander_time)
+    return np.column_stack(
+        [spread * _colored(rng, samples, time) for spread, time in zip(spreads, times, strict=True)]
+    )
+
+
+TREMBLING: Final = 0.2
+"""Correlation time of errors of the steering wheel, s (engineering choice)."""
+
+FADE_IN: Final = 3.0
+"""Time in which a driver's errors grow to their size, so that drives begin calm, s."""
+
+
+def _colored(rng: np.random.Generator, samples: int, time: float) -> Floats:
+    """Noise of unit variance through two first-order low-passes of a time constant, s, from 0 on."""
+    decay = np.exp(-DT / time)
+    # Variance of white noise after (1 - d)^2 / (1 - d z^-1)^2.
+    power = (1.0 - decay) ** 4 * (1.0 + decay**2) / (1.0 - decay**2) ** 3
+    noise = lfilter([(1.0 - decay) ** 2], [1.0, -2.0 * decay, decay**2], rng.normal(size=samples))
+    fade = np.clip(DT * np.arange(samples) / FADE_IN, 0.0, 1.0)
+    return np.asarray(fade**2 * noise / np.sqrt(power))
 
 
 def fill(target: Any, source: Any) -> Any:
@@ -271,12 +355,15 @@ def _trace(plan: Plan, rows: Floats) -> CueTrace:
         added = shaking(plan.car, plan.roughness, distance, DT)
         force, rate = force + added.force, rate + added.rate
         rate_derivative = rate_derivative + added.rate_derivative
+    channels = {name: rows[:, 9 + k] for k, name in enumerate(COLUMNS)}
+    if plan.car.gearbox is None:
+        del channels["gear"]
     return CueTrace(
         name=plan.name,
         time=np.asarray(DT * np.arange(len(rows)), dtype=np.float64),
         specific_force=force,
         angular_velocity=rate,
         angular_acceleration=rate_derivative,
-        channels={name: rows[:, 9 + k] for k, name in enumerate(COLUMNS)},
+        channels=channels,
         source=plan.source or f"{plan.car.name}, vehicle model",
     )

@@ -117,6 +117,65 @@ class Drivetrain:
     standstill_damping: NonNegative = 15.0
 
 
+MOST_GEARS: Final = 16
+"""Of a gearbox."""
+
+
+@configuration
+class Gearbox:
+    """Gears: interruptions of the drive force at shifts, and the engine's drag when coasting.
+
+    The engine turns up with speed times ratio. A gear is left upwards where the engine turns as fast as the
+    first gear does at ``shift_speed`` (1 + ``urgency`` x share of the drive force), and downwards where the
+    gear below would turn it slower than ``down_share`` of that.
+
+    Args:
+        ratios: Of the gears, falling; only their quotients matter.
+        shift_speed: Speed at which the first gear is left with little throttle, m/s.
+        urgency: How much later shifts come at full throttle, as a share.
+        down_share: Of the speed of the engine at which the driver shifts up: below it, down.
+        gap: Duration of a shift, s: the force is lowered from its beginning to its end.
+        depth: Share of the drive force that is missing meanwhile: 1 for a clutch that opens, less where one
+            clutch hands over to another.
+        closing: Time in which the force comes back, s. The shorter, the more jerk.
+        dwell: Least time from the end of a shift to the next one, s.
+        engine_braking: Deceleration by the engine's drag in the first gear, m/s^2; in others by their ratio.
+        driveline_frequency: Of the elastic driveline with the car's mass, rad/s (about 3 Hz).
+        driveline_damping: Its damping ratio; below 0.7 a shift ends with a shuffle.
+        manual: Whether a driver shifts, each at a pace of their own.
+    """
+
+    ratios: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_GEARS)]
+    shift_speed: Positive
+    urgency: NonNegative = 0.8
+    down_share: Annotated[float, Field(gt=0.0, lt=0.95)] = 0.75
+    gap: Positive = 0.4
+    depth: Share = 1.0
+    closing: Positive = 0.1
+    dwell: NonNegative = 0.5
+    engine_braking: NonNegative = 1.0
+    driveline_frequency: Annotated[float, Field(gt=0.0, le=100.0)] = 19.0
+    driveline_damping: Positive = 0.5
+    manual: bool = True
+
+    def __post_init__(self) -> None:
+        if any(after >= before for before, after in zip(self.ratios, self.ratios[1:], strict=False)):
+            raise ValueError(f"ratios must fall from gear to gear, found {list(self.ratios)}")
+
+
+@configuration
+class Stability:
+    """Stability control: single wheels are braked against a car that turns more than its wheel asks for.
+
+    Args:
+        stability_gain: Yaw moment per excess of the yaw rate, N m s/rad.
+        stability_moment: Largest yaw moment, N m.
+    """
+
+    stability_gain: Positive
+    stability_moment: Positive
+
+
 @configuration
 class Car:
     """A car. Lengths in meters, body axes x forward, y right, z down, origin at the c.g.
@@ -139,6 +198,8 @@ class Car:
         reference_point: Origin of F_A, where cues are given, from the c.g., m. The default is the seat
             (H-point) of a driver on the left, 1.45 m behind the front axle and 0.5 m above the road
             (engineering choice).
+        gearbox: Gears; None for a drive force without interruption.
+        stability: Stability control; None for none.
     """
 
     name: str
@@ -156,6 +217,8 @@ class Car:
     steering: Steering = field(default_factory=Steering)
     reference_point: Vector3 = (-0.25, -0.37, 0.05)
     description: str = ""
+    gearbox: Gearbox | None = None
+    stability: Stability | None = None
 
     def __post_init__(self) -> None:
         if self.suspension.sprung_mass > self.mass:
@@ -307,6 +370,27 @@ _CARS: Final[Registry[Any]] = Registry("car", "motion_cueing.cars")
 
 for _car in (SEDAN, BMW_320I, VOLVO_V40, E_CLASS_SUV):
     _CARS.register(_car.name, _car, _car.description)
+
+for _name, _about in (
+    ("kei-car", "kei car, 900 kg, 47 kW, manual"),
+    ("compact", "compact car, 1280 kg, 85 kW, manual"),
+    ("executive", "executive saloon, 1750 kg, 180 kW, automatic"),
+    ("sports-car", "sports car, 1500 kg, 290 kW, double clutch"),
+    ("electric-car", "electric car, 1900 kg, 200 kW, one gear, strong recuperation"),
+    ("van", "delivery van, 2700 kg loaded, 103 kW, manual"),
+    ("truck", "truck of two axles, 12 t, 184 kW, automated 9-speed gearbox"),
+    ("race-car", "GT race car, 1300 kg, 370 kW, sequential gearbox"),
+    ("pickup", "pickup, 2250 kg, 150 kW, automatic; reserved for held-out drives"),
+    ("hot-hatch", "hot hatch, 1400 kg, 190 kW, manual; reserved for held-out drives"),
+    ("city-bus", "city bus, 14 t, 210 kW, four-speed automatic; reserved for held-out drives"),
+):
+    _CARS.register(_name, f"{__package__}.fleet:{_name.upper().replace('-', '_')}", _about)
+
+STANDARD_CARS: Final = ("sedan", "bmw-320i", "volvo-v40", "e-class-suv")
+"""The cars without gears, which drive every standard maneuver."""
+
+RESERVED_CARS: Final = ("pickup", "hot-hatch", "city-bus")
+"""Cars of held-out drives, in no distribution that trains or tunes."""
 
 
 register = _CARS.register

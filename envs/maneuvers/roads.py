@@ -6,16 +6,22 @@ and limits allow, with a driver's accelerations.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from ..car.kernels.vehicle import AIR_DENSITY
 from ..car.plans import DT, HOLD, STEP, Schedule, bend
+from ..car.vehicles import Car
+from ..cues import GRAVITY
 from ..errors import DataError
+from .circuits import Circuit, random_circuit
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +53,12 @@ def speed_limit(curvature: Floats, limit: Floats, style: Style) -> Floats:
 
 
 def along_path(
-    limit: Floats, style: Style, stops: Sequence[tuple[int, float]], duration: float | None
+    limit: Floats,
+    style: Style,
+    stops: Sequence[tuple[int, float]],
+    duration: float | None,
+    smoothing: float = SMOOTHING,
+    ability: Ability | None = None,
 ) -> Schedule:
     """The schedule of a path with a speed limit (n,), m/s, at each of its points.
 
@@ -56,11 +67,15 @@ def along_path(
         style: The driver's.
         stops: Point of the path and time to stand there, s, for each stop.
         duration: Of the drive, s: cut there; to the end of the path if None.
+        smoothing: Width of the moving average of the speed, taken twice, s.
+        ability: What the car can do on this path; whatever the style asks for if None.
 
     Raises:
         DataError: the path ends before ``duration``.
     """
-    speed = _reachable(limit, style, [point for point, _ in stops])
+    points = [point for point, _ in stops]
+    reach = _reachable if ability is None else partial(_reachable_by, ability)
+    speed = reach(limit, style, points)
     step = 2.0 * STEP / np.maximum(speed[1:] + speed[:-1], 1e-6)
     arrival = np.concatenate(([0.0], np.cumsum(step)))
     nodes, speeds = arrival, speed
@@ -72,7 +87,7 @@ def along_path(
     if nodes[-1] < end - DT:
         raise DataError(f"the path ends after {nodes[-1]:.1f} s, before the drive of {end:.1f} s")
     time = DT * np.arange(round(end / DT) + 1)
-    return _smoothed(np.interp(time, nodes, speeds))
+    return _smoothed(np.interp(time, nodes, speeds), smoothing)
 
 
 def _reachable(limit: Floats, style: Style, stops: Sequence[int]) -> Floats:
@@ -88,8 +103,95 @@ def _reachable(limit: Floats, style: Style, stops: Sequence[int]) -> Floats:
     return np.asarray(np.sqrt(np.array(square)))
 
 
-def _smoothed(speed: Floats) -> Schedule:
-    width = round(SMOOTHING / DT)
+@dataclass(frozen=True, eq=False)
+class Ability:
+    """What a car can do along a path, so that plans keep within it.
+
+    Args:
+        car: The car.
+        curvature: (n,) of the path, 1/m.
+        grade: (n,) of the path, rad.
+    """
+
+    car: Car
+    curvature: Floats
+    grade: Floats
+
+    @classmethod
+    def style(cls, style: Style, car: Car) -> Style:
+        """The style, within the car's grip, brakes and rollover threshold T / (2 h)."""
+        grip = MOST_GRIP * car.tires.friction * GRAVITY
+        drivetrain = car.drivetrain
+        share = MOST_TOPPLE if car.mass < HEAVY else LOADED_TOPPLE
+        topple = share * TRACK * 0.5 * car.width / car.cg_height * GRAVITY
+        return Style(
+            min(style.accelerate, MOST_GRIP * drivetrain.max_drive_force / car.mass, 0.6 * grip),
+            min(style.brake, MOST_GRIP * drivetrain.max_brake_force / car.mass, grip),
+            min(style.lateral, MOST_LATERAL * car.tires.friction * GRAVITY, topple),
+        )
+
+    def power(self) -> float:
+        """W/kg that accelerate the car."""
+        return MOST_GRIP * self.car.drivetrain.max_power / self.car.mass
+
+    def drag(self) -> float:
+        """Deceleration by air per square of the speed, 1/m."""
+        return 0.5 * AIR_DENSITY * self.car.drivetrain.drag_area / self.car.mass
+
+
+MOST_GRIP: Final = 0.85
+"""Share of grip, force and power that plans use of a car (engineering choice)."""
+
+MOST_LATERAL: Final = 0.78
+"""Share of grip that plans use in bends (engineering choice)."""
+
+MOST_TOPPLE: Final = 0.5
+"""Share of the rollover threshold that plans use (engineering choice)."""
+
+LOADED_TOPPLE: Final = 0.33
+"""The same for drivers of vans, trucks and buses, who carry loads or people."""
+
+HEAVY: Final = 2500.0
+"""Mass from which a vehicle is one of those, kg."""
+
+TRACK: Final = 0.85
+"""Distance of the wheels of an axle over the car's width (engineering choice)."""
+
+SLOWEST: Final = 9.0
+"""Square of the speed that a car always reaches, however steep the road, m^2/s^2."""
+
+
+def _reachable_by(ability: Ability, limit: Floats, style: Style, stops: Sequence[int]) -> Floats:
+    """As :func:`_reachable`, within power and within an ellipse of both accelerations (trail braking)."""
+    square = (limit**2).tolist()
+    for point in stops:
+        square[point] = 0.0
+    bend = ((ability.curvature / style.lateral) ** 2).tolist()
+    climb = (GRAVITY * np.sin(ability.grade) + ability.car.drivetrain.rolling_resistance * GRAVITY).tolist()
+    power, drag, step = ability.power(), ability.drag(), 2.0 * STEP
+    before = square[0]
+    for i in range(1, len(square)):
+        reached = square[i]
+        if reached > before:
+            most = min(style.accelerate, power / math.sqrt(before) if before > 1.0 else power)
+            most -= drag * before + climb[i - 1]
+            gain = most * math.sqrt(max(1.0 - bend[i - 1] * before * before, 0.05))
+            reached = min(reached, max(before + step * gain, SLOWEST if before >= SLOWEST else before + 0.2))
+            square[i] = reached
+        before = reached
+    after = square[-1]
+    for i in range(len(square) - 2, -1, -1):
+        reached = square[i]
+        if reached > after:
+            most = style.brake * math.sqrt(max(1.0 - bend[i + 1] * after * after, 0.05))
+            reached = min(reached, after + step * most)
+            square[i] = reached
+        after = reached
+    return np.asarray(np.sqrt(np.array(square)))
+
+
+def _smoothed(speed: Floats, smoothing: float) -> Schedule:
+    width = max(round(smoothing / DT), 1)
     for _ in range(2):
         speed = uniform_filter1d(speed, width, mode="nearest")
     acceleration = np.gradient(speed, DT)
@@ -119,6 +221,11 @@ class RoadKind:
         events: Relative frequency of each event.
         weave_period: Of a weave at the limit, s.
         weave_width: Amplitude of a weave, m.
+        smoothing: Width of the moving average of the speed, taken twice, s.
+        roughness: G(n0) of the road, 1e-6 m^3, of which the square root is drawn; that of the drives if None.
+        bumps: Potholes, seams and humps per kilometer, beside those of the drives.
+        bank: Largest cross slope of bends of a circuit, rad.
+        severity: Of open-loop steering, as a multiple of the wheel's angle at 0.3 g.
     """
 
     speed: Range
@@ -135,6 +242,11 @@ class RoadKind:
     events: dict[str, float]
     weave_period: Range = (2.6, 4.5)
     weave_width: Range = (0.4, 1.2)
+    smoothing: float = SMOOTHING
+    roughness: Range | None = None
+    bumps: Range = (0.0, 0.0)
+    bank: Range = (0.0, 0.0)
+    severity: Range = (1.0, 1.0)
 
 
 KMH: Final = 1.0 / 3.6
@@ -244,10 +356,63 @@ KINDS: Final = {
         weave_period=(2.3, 4.5),
         weave_width=(0.4, 1.4),
     ),
+    "circuit": RoadKind(
+        speed=(50 * KMH, 90 * KMH),
+        accelerate=(3.0, 6.0),
+        brake=(4.5, 9.5),
+        lateral=(5.0, 9.8),
+        straight=(STEP, STEP),
+        radius=(14.0, 140.0),
+        angle=(0.2, 2.4),
+        transition=(5.0, 12.0),
+        lane_change=(3.0, 5.0),
+        grade=(0.0, 0.04),
+        waves=((200.0, 400.0), (400.0, 900.0)),
+        events={"lap": 1},
+        smoothing=0.35,
+        bank=(0.0, 0.15),
+    ),
+    "limit": RoadKind(
+        speed=(50 * KMH, 90 * KMH),
+        accelerate=(2.0, 4.0),
+        brake=(6.0, 9.5),
+        lateral=(6.0, 9.0),
+        straight=(40.0, 120.0),
+        radius=(30.0, 150.0),
+        angle=(0.4, 1.6),
+        transition=(5.0, 12.0),
+        lane_change=(1.7, 2.6),
+        grade=(0.0, 0.01),
+        waves=ROLLING,
+        events={"dwell": 3, "step": 3, "stop": 3, "weave": 3, "lane_change": 2, "bend": 1, "slow": 1},
+        weave_period=(1.9, 3.2),
+        weave_width=(0.4, 1.3),
+        smoothing=0.25,
+        severity=(1.0, 6.5),
+    ),
+    "rough": RoadKind(
+        speed=(25 * KMH, 80 * KMH),
+        accelerate=(0.8, 2.4),
+        brake=(1.0, 3.5),
+        lateral=(1.5, 3.5),
+        straight=(20.0, 200.0),
+        radius=(25.0, 300.0),
+        angle=(0.2, 1.2),
+        transition=(8.0, 30.0),
+        lane_change=(3.0, 5.0),
+        grade=(0.0, 0.05),
+        waves=ROLLING,
+        events={"bend": 5, "corner": 1, "stop": 1, "slow": 3, "lane_change": 1},
+        roughness=(64.0, 1024.0),
+        bumps=(3.0, 20.0),
+    ),
 }
 """Engineering choices: speed limits of European roads, accelerations of ordinary to brisk drivers; on the
 handling track those of a test driver, in the hills slopes and crests of mountain roads, on the strip standing
-starts and full braking, among cones weaves, sudden bends and lane changes close to what tires hold."""
+starts and full braking, among cones weaves, sudden bends and lane changes close to what tires hold. On a
+circuit laps at 0.5 to 1 g with trail braking, banked corners and curbs; at the limit open-loop steering tests
+up to the severity of FMVSS 126, full braking and swerves; on rough roads G(n0) up to a very bad road of
+ISO 8608, with potholes, seams and humps."""
 
 CORNER_RADIUS: Final[Range] = (9.0, 18.0)
 """Of a right-angled turn at a crossing, m."""
@@ -262,6 +427,46 @@ WEAVE_PERIODS: Final[Range] = (2.0, 5.0)
 """Of a weave."""
 
 
+@dataclass(frozen=True)
+class Steer:
+    """A steering test on a road: the robot has the wheel from one point to another.
+
+    Args:
+        first: Point where it begins.
+        last: Where the driver takes over.
+        severity: Amplitude over the wheel's angle at 0.3 g in the linear range; signed, right positive.
+        frequency: Of a sine with dwell, Hz; of a step, the inverse of the time that it is held.
+        dwell: Whether it is a sine with dwell, not a step.
+    """
+
+    first: int
+    last: int
+    severity: float
+    frequency: float
+    dwell: bool
+
+    def wave(self, time: Floats) -> Floats:
+        """Shape over time from the onset, s, within [-1, 1]."""
+        if self.dwell:
+            return sine_with_dwell(time, self.frequency, DWELL)
+        return np.clip(np.minimum(time, 1.0 / self.frequency - time) / STEP_RISE, 0.0, 1.0)
+
+
+DWELL: Final = 0.5
+"""Pause of a sine with dwell, s (FMVSS 126)."""
+
+STEP_RISE: Final = 0.2
+"""Time in which a step of the wheel reaches its angle, s."""
+
+
+def sine_with_dwell(time: Floats, frequency: float, dwell: float) -> Floats:
+    """A sine that pauses at its second peak, over time from its onset, s; within [-1, 1]."""
+    peak = 0.75 / frequency
+    phase = np.where(time < peak, time, np.maximum(time - dwell, peak))
+    inside = (time >= 0.0) & (time <= 1.0 / frequency + dwell)
+    return np.where(inside, np.sin(2.0 * math.pi * frequency * phase), 0.0)
+
+
 @dataclass
 class Road:
     """A road under construction: what to drive, how fast, and where to stop.
@@ -270,6 +475,14 @@ class Road:
         kind: Of road.
         rng: Source of chance.
         limit: Speed limit in force, m/s.
+        curvature: Of its stretches.
+        limits: Of its stretches.
+        stops: Point of each stop, and time to stand there, s.
+        points: So far.
+        steers: Open-loop steering tests.
+        circuit: That is driven round.
+        lateral: Centripetal acceleration of its drivers, m/s^2.
+        laps: Point where each lap of the circuit begins.
     """
 
     kind: RoadKind
@@ -279,6 +492,10 @@ class Road:
     limits: list[Floats] = field(default_factory=list)
     stops: list[tuple[int, float]] = field(default_factory=list)
     points: int = 0
+    steers: list[Steer] = field(default_factory=list)
+    circuit: Circuit | None = None
+    lateral: float = math.inf
+    laps: list[int] = field(default_factory=list)
 
     def draw(self, bounds: Range) -> float:
         """Uniform within the bounds."""
@@ -361,6 +578,36 @@ def add_roundabout(road: Road) -> None:
         road.add(piece)
 
 
+def add_dwell(road: Road) -> None:
+    """A sine with dwell by a robot, to either side, and a second to settle."""
+    _add_steer(road, 1.0 / road.draw((0.5, 0.8)), True)
+
+
+def add_step(road: Road) -> None:
+    """A step of the wheel by a robot, held and taken back."""
+    _add_steer(road, road.draw((0.8, 3.0)), False)
+
+
+def _add_steer(road: Road, period: float, dwell: bool) -> None:
+    severity = road.sign() * road.draw(road.kind.severity)
+    length = (period + dwell * DWELL + 1.0) * road.limit
+    first = road.points
+    road.add_straight(length)
+    road.steers.append(Steer(first, road.points, severity, 1.0 / period, dwell))
+
+
+def add_lap(road: Road) -> None:
+    """One lap of the circuit, always the same."""
+    if road.circuit is None:
+        road.circuit = random_circuit(road.rng, road.draw(road.kind.bank))
+        road.limit = road.draw((130.0 * KMH, 260.0 * KMH))
+    curvature = road.circuit.curvature
+    road.laps.append(road.points)
+    road.add(curvature)
+    # As fast as its bends allow, so that the time of a lap is about right.
+    road.limits[-1] = np.minimum(road.limit, np.sqrt(road.lateral / np.maximum(np.abs(curvature), 1e-9)))
+
+
 EVENTS: Final[dict[str, Callable[[Road], None]]] = {
     "bend": add_bend,
     "corner": add_corner,
@@ -369,5 +616,11 @@ EVENTS: Final[dict[str, Callable[[Road], None]]] = {
     "lane_change": add_lane_change,
     "roundabout": add_roundabout,
     "weave": add_weave,
+    "dwell": add_dwell,
+    "step": add_step,
+    "lap": add_lap,
 }
 """What can happen on a road, by name."""
+
+ORDINARY_KINDS: Final = ("urban", "rural", "highway", "track", "hilly", "strip", "cones")
+"""Kinds of the first versions, on which nothing is beyond what ordinary driver and car do."""

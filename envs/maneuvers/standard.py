@@ -17,7 +17,7 @@ from ..car.vehicles import SEDAN, Car
 from ..cues import GRAVITY, CueTrace
 from ..errors import ConfigurationError
 from ..settings import Positive, configuration
-from .roads import KMH, Floats, Style, along_path, speed_limit
+from .roads import KMH, Floats, Style, along_path, sine_with_dwell, speed_limit
 
 DEGREE: Final = math.pi / 180.0
 """One degree in radians."""
@@ -72,7 +72,7 @@ class Maneuver(ABC):
 def off_path(plan: Plan, trace: CueTrace) -> float:
     """Largest distance from the path, m; 0 within :data:`LARGEST_OFFSET`, and in open-loop steering tests."""
     offset = float(np.abs(trace.channels["path_offset_m"]).max())
-    return offset if plan.steering is None and offset > LARGEST_OFFSET else 0.0
+    return offset if plan.follows.any() and offset > LARGEST_OFFSET else 0.0
 
 
 def _late_driver() -> Driver:
@@ -231,10 +231,7 @@ class SineWithDwell(Maneuver):
 
     def wave(self, time: Floats) -> Floats:
         """Shape of the steering over time from its onset, within [-1, 1]."""
-        peak = 0.75 / self.frequency
-        phase = np.where(time < peak, time, np.maximum(time - self.dwell, peak))
-        inside = (time >= 0.0) & (time <= 1.0 / self.frequency + self.dwell)
-        return np.where(inside, np.sin(2.0 * math.pi * self.frequency * phase), 0.0)
+        return sine_with_dwell(time, self.frequency, self.dwell)
 
     def plan(self, car: Car) -> Plan:
         """The sine with its dwell, to the right first."""

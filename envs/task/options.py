@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 
 from ..errors import ConfigurationError, suggest
 from ..maneuvers import RandomDrives, maneuver_names, recording_names
+from ..maneuvers.sampling import NamedDrives
 from ..perception.models import vestibular_model_names
 from ..platform.machines import Platform
 from ..platform.presets import ablation_names, load_platform, platform_names
@@ -43,7 +44,8 @@ class EpisodeOptions:
 
     Args:
         drives: Maneuvers and recordings by name, one drawn for each episode; none for random drives.
-        random: The random drives, and the cars that drive them and the maneuvers.
+        random: The random drives, and the cars that drive them and the maneuvers; a distribution by name,
+            such as ``broad``, by its YAML file, or by fields that change the one named ``preset``.
         library: Random drives to draw from. They are made when the environment is.
         library_seed: Of the random drives, and of the machines and cars of the randomization.
         drive_duration: Of a random drive, s.
@@ -54,7 +56,7 @@ class EpisodeOptions:
     """
 
     drives: tuple[str, ...] = ()
-    random: RandomDrives = RandomDrives()
+    random: NamedDrives = RandomDrives()
     library: PositiveCount = 16
     library_seed: Count = 0
     drive_duration: Positive = 60.0

@@ -15,9 +15,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field
 
-from ...envs.car import car_names
+from ...envs.car.vehicles import STANDARD_CARS
 from ...envs.maneuvers import RandomDrives
-from ...envs.maneuvers.roads import KINDS
+from ...envs.maneuvers.roads import ORDINARY_KINDS
 from ...envs.platform import Platform
 from ...envs.settings import NonNegative, Positive, configuration, to_dict
 from ...envs.simulator.simulator import TIME_STEP
@@ -32,8 +32,8 @@ NOMINAL: Final = "nominal"
 SLOWER: Final = "slower"
 """Name of the condition with machines whose actuators have a lag and a dead time."""
 
-_EVENLY: Final[dict[str, Any]] = dict.fromkeys(KINDS, 1.0)
-_EVERY_KIND: Final = RandomDrives(**_EVENLY, roughness=(0.0, 600.0), cars=tuple(car_names()))
+_EVENLY: Final[dict[str, Any]] = dict.fromkeys(ORDINARY_KINDS, 1.0)
+_EVERY_KIND: Final = RandomDrives(**_EVENLY, roughness=(0.0, 600.0), cars=STANDARD_CARS)
 
 
 @configuration
@@ -44,8 +44,8 @@ class Endurance:
     5 to 14 Hz, the range of common motion bases (from memory).
 
     Args:
-        drives: Distribution of the drives; default: every kind of road in every car, equally often,
-            smooth to rough.
+        drives: Distribution of the drives; default: every ordinary kind of road in every car without gears,
+            equally often, smooth to rough.
         duration: Of a drive, s.
         friction: Range of a factor on the tires' friction.
         natural_frequency: Range of the actuators' lag, rad/s, drawn for each subsystem of a machine.

@@ -6,11 +6,12 @@ are one launch.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import warp as wp
+from pydantic import Field
 
-from ...arrays import real, vec2, vec6
+from ...arrays import real, vec2
 from ...cues import GRAVITY
 from ...settings import NonNegative, Positive, configuration
 from ..plans import DT, STEP
@@ -25,6 +26,7 @@ from .vehicle import (
     CarParameters,
     Commands,
     Cue,
+    Gear,
     Slope,
     State,
     X,
@@ -32,17 +34,32 @@ from .vehicle import (
     air_drag,
     cues,
     derivative,
+    engine_brake,
+    first_gear,
+    limited,
+    most_drive,
     resist,
     runge_kutta,
+    shifted,
     slip_for,
+    stabilizing_moment,
+    transmitted,
 )
 
 wp.set_module_options({"enable_backward": False})
+
+LONGEST_DELAY = 0.5
+"""Of a driver's reaction, s."""
+
+MEMORY = 64
+"""Samples of the steering that a delayed driver has in mind: more than :data:`LONGEST_DELAY`."""
 
 
 @configuration
 class Driver:
     """How a driver steers and uses the pedals. The values are engineering choices.
+
+    The default is the standard driver, who makes no errors of chance.
 
     Args:
         preview_time: Time to the point the driver aims at, s. The path error then closes with natural
@@ -54,6 +71,16 @@ class Driver:
         speed_gain: Acceleration asked for per speed error, 1/s.
         position_gain: Acceleration asked for per error of the position along the path, 1/s^2.
         pedal_anticipation: How far ahead the planned acceleration is pedalled, s.
+        reaction_delay: From what is seen to what the arms do, s; at most :data:`LONGEST_DELAY`.
+        lane_wander: Standard deviation of the line aimed at from the path, m.
+        wander_time: Correlation time of that line and of errors in speed, s.
+        steering_noise: Standard deviation of the error of the steering-wheel angle, rad.
+        pedal_noise: Standard deviation of the error of the acceleration asked for, m/s^2.
+        catch_up: Largest acceleration added to the planned one to make up for an error, m/s^2; 0 for no
+            bound.
+        patience: How far the plan may get ahead of the car before it waits for it, m; 0 for a plan that
+            never waits.
+        shift_pace: Factor on the time that shifting gears takes.
     """
 
     preview_time: Positive = 0.8
@@ -63,6 +90,19 @@ class Driver:
     speed_gain: Positive = 1.0
     position_gain: NonNegative = 0.15
     pedal_anticipation: NonNegative = 0.12
+    reaction_delay: Annotated[float, Field(ge=0.0, le=LONGEST_DELAY)] = 0.0
+    lane_wander: NonNegative = 0.0
+    wander_time: Positive = 3.0
+    steering_noise: NonNegative = 0.0
+    pedal_noise: NonNegative = 0.0
+    catch_up: NonNegative = 0.0
+    patience: NonNegative = 0.0
+    shift_pace: Positive = 1.0
+
+    @property
+    def errs(self) -> bool:
+        """Whether chance plays a part."""
+        return max(self.lane_wander, self.steering_noise, self.pedal_noise) > 0.0
 
 
 @wp.struct
@@ -76,6 +116,10 @@ class DriverParameters:
     speed_gain: real
     position_gain: real
     pedal_anticipation: real
+    reaction_delay: real
+    catch_up: real
+    patience: real
+    shift_pace: real
 
 
 @wp.struct
@@ -88,13 +132,15 @@ class Errors:
 
 
 @wp.func
-def road_wheel_for(car: CarParameters, speed: real, curvature: real) -> real:
+def road_wheel_for(car: CarParameters, speed: real, curvature: real, bank: real) -> real:
     """(D1) Road-wheel angle of a steady turn, delta = L kappa + alpha_f - alpha_r with the tires' slips, rad.
 
-    The feed-forward of Kapania and Gerdes (2015); in the linear range it is (L + K v^2) kappa.
+    The feed-forward of Kapania and Gerdes (2015); in the linear range it is (L + K v^2) kappa. A bank, rad,
+    takes its share of gravity off the tires.
     """
     wheelbase = car.front_axle + car.rear_axle
     lateral = car.mass * speed * speed * curvature / wheelbase
+    lateral = lateral - car.mass * real(GRAVITY) * wp.sin(bank) / wheelbase
     grip = car.friction * car.mass * real(GRAVITY) / wheelbase
     a, b = car.front_axle, car.rear_axle
     front = slip_for(lateral * b, grip * b, car.front_cornering_stiffness, car.shape_factor)
@@ -103,7 +149,9 @@ def road_wheel_for(car: CarParameters, speed: real, curvature: real) -> real:
 
 
 @wp.func
-def wheel_command(car: CarParameters, driver: DriverParameters, state: State, errors: Errors) -> real:
+def wheel_command(
+    car: CarParameters, driver: DriverParameters, state: State, errors: Errors, bank: real
+) -> real:
     """(D2) Steering-wheel angle: feed-forward of the anticipated curvature, and preview feedback.
 
     The feedback aims at a point ahead on the path, kappa = -2 e_aim / l^2 with e_aim the offset extrapolated
@@ -114,7 +162,7 @@ def wheel_command(car: CarParameters, driver: DriverParameters, state: State, er
     course = errors.heading + wp.atan2(state[LATERAL], wp.max(u, real(1.0)))
     aim = errors.offset + distance * wp.sin(course)
     curvature = errors.curvature_ahead - real(2.0) * aim / (distance * distance)
-    return car.ratio * road_wheel_for(car, u, curvature)
+    return car.ratio * road_wheel_for(car, u, curvature, bank)
 
 
 @wp.struct
@@ -125,6 +173,7 @@ class SpeedTarget:
     position: real  # along the path, m
     acceleration: real  # anticipated, m/s^2
     acceleration_now: real  # m/s^2
+    error: real  # of the acceleration asked for, by chance, m/s^2
 
 
 @wp.func
@@ -150,20 +199,21 @@ def force_command(
         + driver.speed_gain * (target.speed - speed)
         + follow * (target.position - position)
     )
+    if driver.catch_up > real(0.0):
+        needed = target.acceleration + limited(needed - target.acceleration, driver.catch_up)
+    needed = needed + target.error
     return car.mass * (needed + slope + car.rolling_resistance * real(GRAVITY)) + air_drag(car, speed)
-
-
-@wp.func
-def most_drive(car: CarParameters, speed: real) -> real:
-    """Largest drive force at this speed: traction-limited, then power-limited, N."""
-    return wp.min(car.max_drive_force, car.max_power / wp.max(speed, real(1.0)))
 
 
 SUBSTEPS = 5
 """Integration steps a sample: 2 ms, a sixth of the fastest time constant (the tires' at 40 m/s)."""
 
-vec4: Any = wp.types.vector(4, real)
-"""A row of a schedule: speed, acceleration, distance, steering-wheel angle."""
+ScheduleRow: Any = wp.types.vector(8, real)
+"""Speed, acceleration, distance, steering-wheel angle, whether the wheel is turned to that angle (1) or along
+the path (0), and the driver's errors by chance: of the line aimed at, of the wheel, of the acceleration."""
+
+PathRow: Any = wp.types.vector(8, real)
+"""A point of a path: the columns of :meth:`~..plans.Path.table`."""
 
 COLUMNS = (
     "x_m",
@@ -180,6 +230,7 @@ COLUMNS = (
     "lateral_acceleration_m_s2",
     "grade_rad",
     "path_offset_m",
+    "gear",
 )
 """Channels of a driven trace, in the order of the kernel's rows after the nine cues."""
 
@@ -209,7 +260,7 @@ class Road:
 
 
 @wp.func
-def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
+def road_at(paths: wp.array(dtype=PathRow), task: Task, station: real) -> Road:
     """The path between its points, curvature and slope changing linearly; straight on after its end."""
     i = wp.clamp(int(wp.floor(station / real(STEP))), 0, task.path_points - 2)
     d = station - real(STEP) * real(i)
@@ -231,10 +282,48 @@ def road_at(paths: wp.array(dtype=vec6), task: Task, station: real) -> Road:
     road.slope.grade = here[4] + here[5] * inside + real(0.5) * steepening * inside * inside
     road.slope.per_meter = here[5] + steepening * inside
     road.slope.per_square_meter = steepening
+    leaning = (there[7] - here[7]) / real(STEP)
+    road.slope.bank = here[6] + here[7] * inside + real(0.5) * leaning * inside * inside
+    road.slope.bank_per_meter = here[7] + leaning * inside
+    road.slope.bank_per_square_meter = leaning
     if outside != real(0.0):
         road.slope.per_meter = real(0.0)
         road.slope.per_square_meter = real(0.0)
+        road.slope.bank_per_meter = real(0.0)
+        road.slope.bank_per_square_meter = real(0.0)
     return road
+
+
+@wp.struct
+class Anchor:
+    """Where the path lies: shifted and turned when the driver takes the wheel again after a steering test."""
+
+    x: real
+    y: real
+    heading: real
+
+
+@wp.func
+def anchored(road: Road, anchor: Anchor) -> Road:
+    """The path's point where the path lies now."""
+    c, s = wp.cos(anchor.heading), wp.sin(anchor.heading)
+    x = anchor.x + (road.x * c - road.y * s)
+    road.y = anchor.y + (road.x * s + road.y * c)
+    road.x = x
+    road.heading = road.heading + anchor.heading
+    return road
+
+
+@wp.func
+def anchor_at(road: Road, state: State) -> Anchor:
+    """The anchor that puts this point of the path, as planned, under the car, along its course."""
+    anchor = Anchor()
+    course = state[HEADING] + wp.atan2(state[LATERAL], wp.max(state[FORWARD], real(1.0)))
+    anchor.heading = course - road.heading
+    c, s = wp.cos(anchor.heading), wp.sin(anchor.heading)
+    anchor.x = state[X] - (road.x * c - road.y * s)
+    anchor.y = state[Y] - (road.x * s + road.y * c)
+    return anchor
 
 
 @wp.func
@@ -246,17 +335,17 @@ def offset_from(road: Road, state: State) -> vec2:
 
 
 @wp.func
-def errors_at(road: Road, ahead: Road, state: State) -> Errors:
-    """Where the car is, seen from its path."""
+def errors_at(road: Road, ahead: Road, state: State, wander: real) -> Errors:
+    """Where the car is, seen from its path, or from the line beside it that the driver aims at."""
     errors = Errors()
-    errors.offset = offset_from(road, state)[1]
+    errors.offset = offset_from(road, state)[1] - wander
     errors.heading = state[HEADING] - road.heading
     errors.curvature_ahead = ahead.curvature
     return errors
 
 
 @wp.func
-def target_at(schedule: wp.array(dtype=vec4), task: Task, sample: int, lead: int) -> SpeedTarget:
+def target_at(schedule: wp.array(dtype=ScheduleRow), task: Task, sample: int, lead: int) -> SpeedTarget:
     """The schedule at a sample, and its acceleration ``lead`` samples later."""
     now = schedule[task.first + sample]
     soon = schedule[task.first + wp.min(sample + lead, task.samples - 1)]
@@ -269,17 +358,18 @@ def target_at(schedule: wp.array(dtype=vec4), task: Task, sample: int, lead: int
 
 
 @wp.func
-def pedals(car: CarParameters, force: real, speed: real) -> vec2:
-    """Drive and brake force asked for, N, within what the car has."""
+def pedals(car: CarParameters, force: real, speed: real, drag: real) -> vec2:
+    """Drive and brake force asked for, N, within what the car has; the engine's drag brakes first."""
     return vec2(
-        wp.clamp(force, real(0.0), most_drive(car, speed)), wp.clamp(-force, real(0.0), car.max_brake_force)
+        wp.clamp(force, real(0.0) - drag, most_drive(car, speed)),
+        wp.clamp(-force - drag, real(0.0), car.max_brake_force),
     )
 
 
 @wp.func
-def rolled(task: Task, road: Road, state: State, station: real, dt: real) -> real:
+def rolled(follows: bool, road: Road, state: State, station: real, dt: real) -> real:
     """The path's point nearest to the car, by one Newton step; the distance driven if there is no path."""
-    if task.open_loop == 1:
+    if not follows:
         return station + state[FORWARD] * dt
     gap = offset_from(road, state)
     stretch = wp.max(real(1.0) - road.curvature * gap[1], real(0.2)) * wp.cos(road.slope.grade)
@@ -300,7 +390,9 @@ def start_state(car: CarParameters, road: Road, speed: real) -> State:
 
 
 @wp.func
-def row_of(car: CarParameters, state: State, cue: Cue, road: Road, command: Commands) -> Row:
+def row_of(
+    car: CarParameters, state: State, cue: Cue, road: Road, command: Commands, gear: Gear, follows: bool
+) -> Row:
     """One sample of the result: nine cues, then :data:`COLUMNS`."""
     row = Row()
     for k in range(3):
@@ -315,12 +407,15 @@ def row_of(car: CarParameters, state: State, cue: Cue, road: Road, command: Comm
     row[14] = state[ROLL]
     row[15] = state[PITCH]
     row[16] = state[WHEEL]
-    row[17] = command.drive / car.max_drive_force
+    row[17] = wp.max(command.drive, real(0.0)) / car.max_drive_force
     row[18] = command.brake / car.max_brake_force
     row[19] = cue.road_acceleration[0]
     row[20] = cue.road_acceleration[1]
     row[21] = road.slope.grade
     row[22] = offset_from(road, state)[1]
+    if not follows:
+        row[22] = real(0.0)
+    row[23] = real(gear.number + 1)
     return row
 
 
@@ -328,27 +423,30 @@ def row_of(car: CarParameters, state: State, cue: Cue, road: Road, command: Comm
 def decide(
     car: CarParameters,
     driver: DriverParameters,
-    task: Task,
     state: State,
-    errors: Errors,
     station: real,
     target: SpeedTarget,
     wheel: real,
+    wheel_lag: real,
     slope: Slope,
+    drag: real,
 ) -> Commands:
-    """What the driver asks for, held for one integration step."""
+    """What the driver asks for, held for one integration step; ``drag`` is the engine's, N."""
     command = Commands()
     force = force_command(car, driver, state[FORWARD], station, target, slope.grade)
-    forces = pedals(car, force, state[FORWARD])
+    forces = pedals(car, force, state[FORWARD], drag)
     command.drive = forces[0]
     command.brake = forces[1]
-    command.wheel_lag = driver.hand_lag
+    command.wheel_lag = wheel_lag
     command.wheel = wheel
-    if task.open_loop == 0:
-        command.wheel = wheel_command(car, driver, state, errors)
     command.grade = slope.grade
     command.grade_per_meter = slope.per_meter
+    command.bank = slope.bank
     return command
+
+
+ROBOT_LAG = 0.02
+"""Time constant of a steering robot, s."""
 
 
 @wp.kernel
@@ -356,32 +454,74 @@ def drive_all(
     cars: wp.array(dtype=CarParameters),
     drivers: wp.array(dtype=DriverParameters),
     tasks: wp.array(dtype=Task),
-    paths: wp.array(dtype=vec6),
-    schedule: wp.array(dtype=vec4),
+    paths: wp.array(dtype=PathRow),
+    schedule: wp.array(dtype=ScheduleRow),
+    memory: wp.array2d(dtype=real),
     substeps: int,
     result: wp.array(dtype=Row),
 ) -> None:
-    """Thread i drives ``tasks[i]`` with ``cars[i]`` and ``drivers[i]``; one row of ``result`` a sample."""
+    """Thread i drives ``tasks[i]`` with ``cars[i]`` and ``drivers[i]``; one row of ``result`` a sample.
+
+    ``memory`` (drives, :data:`MEMORY`) is what delayed drivers have decided and not done yet.
+    """
     i = wp.tid()
     car, driver, task = cars[i], drivers[i], tasks[i]
     dt = real(DT) / real(substeps)
     lead = int(driver.pedal_anticipation / real(DT))
+    delay = int(driver.reaction_delay / real(DT) + real(0.5))
     station, deflection = real(0.0), real(0.0)
     state = start_state(car, road_at(paths, task, station), schedule[task.first][0])
+    gear = first_gear(car, state[FORWARD])
+    gear.force = state[DRIVE]
+    anchor = Anchor()
+    followed = bool(True)
+    late = int(0)
     for sample in range(task.samples):
-        target = target_at(schedule, task, sample, lead)
-        wheel = schedule[task.first + sample][3]
+        row = schedule[task.first + sample - late]
+        follows = row[4] == real(0.0)
+        # A plan that waits for the car stays where it is for this sample.
+        ahead_of_car = row[2] - station
+        if driver.patience > real(0.0) and follows and sample > 0 and ahead_of_car > driver.patience:
+            late += 1
+            row = schedule[task.first + sample - late]
+            follows = row[4] == real(0.0)
+        errors_now = schedule[task.first + sample]
+        target = target_at(schedule, task, sample - late, lead)
+        target.error = errors_now[7]
+        if follows and not followed:
+            anchor = anchor_at(road_at(paths, task, station), state)
+        followed = follows
+        if car.gears > 0:
+            gear = shifted(car, gear, driver.shift_pace, state, real(DT))
         for substep in range(substeps):
-            road = road_at(paths, task, station)
-            ahead = road_at(paths, task, station + driver.anticipation * state[FORWARD])
-            errors = errors_at(road, ahead, state)
-            target.position = schedule[task.first + sample][2] + target.speed * real(substep) * dt
-            command = decide(car, driver, task, state, errors, station, target, wheel, road.slope)
+            road = anchored(road_at(paths, task, station), anchor)
+            wheel, wheel_lag = real(row[3]), real(driver.hand_lag)
+            if follows:
+                ahead = road_at(paths, task, station + driver.anticipation * state[FORWARD])
+                errors = errors_at(road, ahead, state, errors_now[5])
+                wheel = wheel_command(car, driver, state, errors, road.slope.bank)
+                if delay > 0:
+                    if substep == 0:
+                        memory[i, sample % MEMORY] = wheel
+                    wheel = memory[i, wp.max(sample - delay, 0) % MEMORY]
+                wheel = wheel + errors_now[6]
+            elif task.open_loop == 0:
+                wheel_lag = real(ROBOT_LAG)
+            target.position = row[2] + target.speed * real(substep) * dt
+            drag = engine_brake(car, gear, state[FORWARD])
+            command = decide(car, driver, state, station, target, wheel, wheel_lag, road.slope, drag)
+            command.yaw_moment = stabilizing_moment(car, state)
+            if car.gears > 0:
+                gear = transmitted(car, gear, driver.shift_pace, state[DRIVE], dt)
+                command.driveline = gear.force - state[DRIVE]
             standing = resist(car, deflection, state, command, dt)
             command.resistance = standing[1]
             if substep == 0:
                 cue = cues(car, state, derivative(car, state, command), road.slope)
-                result[task.first + sample] = row_of(car, state, cue, road, command)
+                result[task.first + sample] = row_of(
+                    car, state, cue, road, command, gear, follows or task.open_loop == 1
+                )
             deflection = standing[0]
             state = runge_kutta(car, state, command, dt)
-            station = rolled(task, road_at(paths, task, station), state, station, dt)
+            nearest = anchored(road_at(paths, task, station), anchor)
+            station = rolled(follows, nearest, state, station, dt)

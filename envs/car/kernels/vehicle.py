@@ -16,6 +16,9 @@ from ...cues import GRAVITY
 
 wp.set_module_options({"enable_backward": False})
 
+vec16: Any = wp.types.vector(16, real)
+"""Ratios of up to 16 gears."""
+
 State: Any = wp.types.vector(15, real)
 """Integrated quantities of one car, by the indices below."""
 
@@ -65,6 +68,22 @@ class CarParameters:
     rolling_resistance: real
     standstill_stiffness: real
     standstill_damping: real
+    # Gearbox; no gears for a car without one.
+    gears: int
+    gear_ratios: vec16
+    shift_speed: real
+    urgency: real
+    down_share: real
+    gap: real
+    depth: real
+    closing: real
+    dwell: real
+    engine_braking: real
+    driveline_frequency: real
+    driveline_damping: real
+    # Stability control; no gain for a car without one.
+    stability_gain: real
+    stability_moment: real
 
 
 @wp.struct
@@ -78,6 +97,9 @@ class Commands:
     resistance: real  # brakes and rolling resistance, opposing the motion, N, see (C8)
     grade: real  # slope of the road along the path, rad, uphill positive
     grade_per_meter: real  # rad/m
+    bank: real  # cross slope of the road, rad, right side down positive
+    driveline: real  # what gearbox and driveline add to the drive force, N, see (C15)
+    yaw_moment: real  # of the stability control, N m, see (C16)
 
 
 @wp.struct
@@ -165,7 +187,9 @@ def air_drag(car: CarParameters, speed: real) -> real:
 @wp.func
 def normal_gravity(command: Commands, speed: real) -> real:
     """(C6) Gravity and the centripetal acceleration of crests and dips, normal to the road, m/s^2."""
-    return real(GRAVITY) * wp.cos(command.grade) + command.grade_per_meter * speed * speed
+    return (
+        real(GRAVITY) * wp.cos(command.grade) * wp.cos(command.bank) + command.grade_per_meter * speed * speed
+    )
 
 
 @wp.func
@@ -178,13 +202,35 @@ def axle_loads(car: CarParameters, gravity: real, traction: real) -> vec2:
     return vec2(wp.max(front, real(0.0)), wp.max(rear, real(0.0)))
 
 
+STABILITY_GRIP = 0.93
+"""Share of an axle's grip that anti-lock brakes and traction control use, so that it still steers."""
+
+
+@wp.func
+def usable_grip(car: CarParameters, load: real) -> real:
+    """Largest longitudinal force of an axle, N: its grip; less with a stability control."""
+    grip = car.friction * load
+    if car.stability_gain > real(0.0):
+        return real(STABILITY_GRIP) * grip
+    return grip
+
+
+@wp.func
+def front_share(car: CarParameters, load: vec2) -> real:
+    """Front axle's share of the brake force: the car's; with a stability control as its share of the load."""
+    if car.stability_gain > real(0.0):
+        return load[0] / wp.max(load[0] + load[1], real(1.0))
+    return car.brake_front_share
+
+
 @wp.func
 def most_resistance(car: CarParameters, brake: real, command: Commands, speed: real) -> real:
     """Largest resisting force of brakes (ideal anti-lock: never beyond friction) and rolling, N."""
     gravity = normal_gravity(command, speed)
     load = axle_loads(car, gravity, -brake)
-    front = wp.min(brake * car.brake_front_share, car.friction * load[0])
-    rear = wp.min(brake * (real(1.0) - car.brake_front_share), car.friction * load[1])
+    share = front_share(car, load)
+    front = wp.min(brake * share, usable_grip(car, load[0]))
+    rear = wp.min(brake * (real(1.0) - share), usable_grip(car, load[1]))
     return front + rear + car.rolling_resistance * car.mass * gravity
 
 
@@ -198,26 +244,30 @@ def solve_pair(mass: real, coupling: real, inertia: real, force: real, moment: r
 
 
 @wp.func
-def front_axle(car: CarParameters, load: real, state: State, command: Commands) -> Axle:
-    """Load, longitudinal force and stiffness of the front axle; the force is held within friction."""
+def front_axle(car: CarParameters, load: real, share: real, state: State, command: Commands) -> Axle:
+    """Load, longitudinal force and stiffness of the front axle; the force is held within friction.
+
+    ``share`` is the front axle's of the brakes.
+    """
     axle = Axle()
     static = car.mass * real(GRAVITY) * car.rear_axle / (car.front_axle + car.rear_axle)
-    force = state[DRIVE] * car.drive_front_share - command.resistance * car.brake_front_share
+    drive = state[DRIVE] + command.driveline
+    force = drive * car.drive_front_share - command.resistance * share
     axle.load = load
-    axle.force = limited(force, car.friction * load)
+    axle.force = limited(force, usable_grip(car, load))
     axle.stiffness = car.front_cornering_stiffness * load / static
     return axle
 
 
 @wp.func
-def rear_axle(car: CarParameters, load: real, state: State, command: Commands) -> Axle:
+def rear_axle(car: CarParameters, load: real, share: real, state: State, command: Commands) -> Axle:
     """The same of the rear axle."""
     axle = Axle()
     static = car.mass * real(GRAVITY) * car.front_axle / (car.front_axle + car.rear_axle)
-    force = state[DRIVE] * (real(1.0) - car.drive_front_share)
-    force = force - command.resistance * (real(1.0) - car.brake_front_share)
+    force = (state[DRIVE] + command.driveline) * (real(1.0) - car.drive_front_share)
+    force = force - command.resistance * (real(1.0) - share)
     axle.load = load
-    axle.force = limited(force, car.friction * load)
+    axle.force = limited(force, usable_grip(car, load))
     axle.stiffness = car.rear_cornering_stiffness * load / static
     return axle
 
@@ -253,9 +303,10 @@ def tire_forces(car: CarParameters, state: State, command: Commands) -> Forces:
     u, r = state[FORWARD], state[YAW_RATE]
     delta = state[WHEEL] / car.ratio
     c, s = wp.cos(delta), wp.sin(delta)
-    load = axle_loads(car, normal_gravity(command, u), state[DRIVE] - command.resistance)
-    front = front_axle(car, load[0], state, command)
-    rear = rear_axle(car, load[1], state, command)
+    load = axle_loads(car, normal_gravity(command, u), state[DRIVE] + command.driveline - command.resistance)
+    share = front_share(car, load)
+    front = front_axle(car, load[0], share, state, command)
+    rear = rear_axle(car, load[1], share, state, command)
 
     # Velocity of the contact patches along and across the wheels.
     front_v = state[LATERAL] + car.front_axle * r
@@ -294,8 +345,9 @@ def derivative(car: CarParameters, state: State, command: Commands) -> State:
     d[Y] = flat * wp.sin(state[HEADING]) + v * wp.cos(state[HEADING])
     d[HEADING] = r
     d[FORWARD] = lengthways[0] - real(GRAVITY) * wp.sin(command.grade) + v * r
-    d[LATERAL] = sideways[0] - u * r
-    d[YAW_RATE] = (car.front_axle * forces.front_y - car.rear_axle * forces.rear_y) / car.yaw_inertia
+    d[LATERAL] = sideways[0] - u * r + real(GRAVITY) * wp.cos(command.grade) * wp.sin(command.bank)
+    moment = car.front_axle * forces.front_y - car.rear_axle * forces.rear_y
+    d[YAW_RATE] = (moment + command.yaw_moment) / car.yaw_inertia
     d[ROLL] = state[ROLL_RATE]
     d[ROLL_RATE] = sideways[1]
     d[PITCH] = state[PITCH_RATE]
@@ -335,12 +387,131 @@ def resist(car: CarParameters, deflection: real, state: State, command: Commands
 
 
 @wp.struct
+class Gear:
+    """The gearbox of a car at one moment."""
+
+    number: int  # from 0, the lowest
+    time: real  # since the last shift began, s
+    force: real  # that the driveline passes to the wheels, N
+    force_rate: real  # N/s
+
+
+@wp.func
+def most_drive(car: CarParameters, speed: real) -> real:
+    """Largest drive force at this speed: traction-limited, then power-limited, N."""
+    return wp.min(car.max_drive_force, car.max_power / wp.max(speed, real(1.0)))
+
+
+@wp.func
+def engine_speed(car: CarParameters, number: int, speed: real) -> real:
+    """Speed at which the lowest gear would turn the engine as fast as this gear does, m/s."""
+    return speed * car.gear_ratios[number] / car.gear_ratios[0]
+
+
+@wp.func
+def shifted(car: CarParameters, gear: Gear, pace: real, state: State, dt: real) -> Gear:
+    """(C15) Up where the engine turns faster than the throttle asks for, down where it turns slower.
+
+    ``pace`` is a factor on the time a shift takes.
+    """
+    gear.time += dt
+    if gear.time < pace * (car.gap + car.closing) + car.dwell:
+        return gear
+    speed = wp.max(state[FORWARD], real(0.0))
+    demand = wp.clamp(state[DRIVE] / most_drive(car, speed), real(0.0), real(1.0))
+    most = car.shift_speed * (real(1.0) + car.urgency * demand)
+    if gear.number < car.gears - 1 and engine_speed(car, gear.number, speed) > most:
+        gear.number += 1
+        gear.time = real(0.0)
+    elif gear.number > 0 and engine_speed(car, gear.number - 1, speed) < car.down_share * most:
+        gear.number -= 1
+        gear.time = real(0.0)
+    return gear
+
+
+@wp.func
+def first_gear(car: CarParameters, speed: real) -> Gear:
+    """The gear of a car that rolls evenly, long after its last shift."""
+    gear = Gear()
+    for k in range(car.gears - 1):
+        if engine_speed(car, k, speed) > car.shift_speed:
+            gear.number = k + 1
+    gear.time = real(1.0e3)
+    return gear
+
+
+@wp.func
+def engaged(car: CarParameters, gear: Gear, pace: real) -> real:
+    """Share of the drive force that the clutches pass: 1 - depth for the gap, then closing evenly."""
+    after = gear.time - pace * car.gap
+    closed = wp.clamp(after / (pace * car.closing), real(0.0), real(1.0))
+    return real(1.0) - car.depth * (real(1.0) - closed)
+
+
+@wp.func
+def transmitted(car: CarParameters, gear: Gear, pace: real, drive: real, dt: real) -> Gear:
+    """The driveline, elastic between clutch and tires: a second-order mode of the force, N."""
+    w = car.driveline_frequency
+    target = engaged(car, gear, pace) * drive
+    gear.force_rate += dt * (
+        w * w * (target - gear.force) - real(2.0) * car.driveline_damping * w * gear.force_rate
+    )
+    gear.force += dt * gear.force_rate
+    return gear
+
+
+IDLE = 0.4
+"""Share of the speed of shifting up below which an engine no longer brakes (engineering choice)."""
+
+
+@wp.func
+def engine_brake(car: CarParameters, gear: Gear, speed: real) -> real:
+    """Largest drag of the engine with the throttle closed, N; none where the clutch opens before a stop."""
+    if car.gears == 0:
+        return real(0.0)
+    turning = wp.clamp(
+        engine_speed(car, gear.number, speed) / (real(IDLE) * car.shift_speed), real(0.0), real(1.0)
+    )
+    return car.mass * car.engine_braking * turning * car.gear_ratios[gear.number] / car.gear_ratios[0]
+
+
+@wp.func
+def stabilizing_moment(car: CarParameters, state: State) -> real:
+    """(C16) Yaw moment of single braked wheels against a yaw rate beyond what the wheel asks for, N m."""
+    u = state[FORWARD]
+    if car.stability_gain == real(0.0) or u < real(STABILITY_FROM):
+        return real(0.0)
+    wheelbase = car.front_axle + car.rear_axle
+    understeer = car.mass / wheelbase
+    understeer *= (
+        car.rear_axle / car.front_cornering_stiffness - car.front_axle / car.rear_cornering_stiffness
+    )
+    wanted = u * state[WHEEL] / car.ratio / (wheelbase + understeer * u * u)
+    wanted = limited(wanted, car.friction * real(GRAVITY) / u)
+    excess = state[YAW_RATE] - wanted
+    excess = excess - limited(excess, real(STABILITY_DEAD_BAND))
+    if excess * state[YAW_RATE] < real(0.0):
+        return real(0.0)  # understeer: left to the driver
+    return limited(-car.stability_gain * excess, car.stability_moment)
+
+
+STABILITY_FROM = 5.0
+"""Speed from which the stability control acts, m/s (engineering choice)."""
+
+STABILITY_DEAD_BAND = 0.03
+"""Error of the yaw rate that it leaves alone, rad/s (engineering choice)."""
+
+
+@wp.struct
 class Slope:
     """The road under the car, along its path."""
 
     grade: real  # rad, uphill positive
     per_meter: real  # rad/m
     per_square_meter: real  # rad/m^2
+    bank: real  # cross slope, rad, right side down positive
+    bank_per_meter: real  # rad/m
+    bank_per_square_meter: real  # rad/m^2
 
 
 @wp.struct
@@ -368,12 +539,14 @@ def cues(car: CarParameters, state: State, rate: State, slope: Slope) -> Cue:
     zero = real(0.0)
     turn = road_to_body(state[ROLL], state[PITCH])
 
-    # The road's frame yaws with the car and pitches with the slope.
+    # The road's frame yaws with the car, pitches with the slope and rolls with the bank.
     tilt = slope.per_meter * u
     tilting = slope.per_square_meter * u * u + slope.per_meter * rate[FORWARD]
-    carried = turn * vec3(zero, tilt, r)
-    carried_rate = turn * vec3(zero, tilting, rate[YAW_RATE])
-    acceleration = vec3(rate[FORWARD] - v * r, rate[LATERAL] + u * r, -tilt * u)
+    lean = slope.bank_per_meter * u
+    leaning = slope.bank_per_square_meter * u * u + slope.bank_per_meter * rate[FORWARD]
+    carried = turn * vec3(lean, tilt, r)
+    carried_rate = turn * vec3(leaning, tilting, rate[YAW_RATE])
+    acceleration = vec3(rate[FORWARD] - v * r, rate[LATERAL] + u * r, lean * v - tilt * u)
 
     # The body's own rotation in that frame.
     c, s = wp.cos(state[ROLL]), wp.sin(state[ROLL])
@@ -384,7 +557,10 @@ def cues(car: CarParameters, state: State, rate: State, slope: Slope) -> Cue:
     cue = Cue()
     cue.angular_velocity = carried + own
     cue.angular_acceleration = carried_rate - wp.cross(own, carried) + own_rate
-    gravity = real(GRAVITY) * vec3(-wp.sin(slope.grade), zero, wp.cos(slope.grade))
+    level = wp.cos(slope.grade)
+    gravity = real(GRAVITY) * vec3(
+        -wp.sin(slope.grade), level * wp.sin(slope.bank), level * wp.cos(slope.bank)
+    )
     point = car.reference_point - vec3(zero, zero, car.arm)
     swing = wp.cross(cue.angular_velocity, wp.cross(cue.angular_velocity, point))
     cue.specific_force = turn * (acceleration - gravity) + wp.cross(cue.angular_acceleration, point) + swing

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from motion_cueing.envs.car import car_names, get_car
+from motion_cueing.envs.car import get_car
+from motion_cueing.envs.car.vehicles import STANDARD_CARS
 from motion_cueing.envs.cues import GRAVITY
 from motion_cueing.envs.errors import ConfigurationError, UnknownNameError
 from motion_cueing.envs.maneuvers import describe_maneuver, get_maneuver, maneuver_names
@@ -38,7 +39,7 @@ def drives():
     return {
         (name, car): get_maneuver(name).drive(get_car(car))
         for name in maneuver_names()
-        for car in car_names()
+        for car in STANDARD_CARS
     }
 
 
@@ -51,7 +52,7 @@ def test_names():
 
 @pytest.mark.parametrize("name", maneuver_names())
 def test_begins_calm_and_ends_calm(drives, name):
-    for car in car_names():
+    for car in STANDARD_CARS:
         trace = drives[name, car]
         assert trace.name == name
         assert trace.dt == pytest.approx(0.01)
@@ -65,14 +66,14 @@ def test_begins_calm_and_ends_calm(drives, name):
 @pytest.mark.parametrize("name", [n for n in maneuver_names() if n not in ("step-steer", "sine-with-dwell")])
 def test_driver_stays_on_the_path(drives, name):
     bound = 0.6 if name in ("slalom", "double-lane-change", "obstacle-avoidance") else 0.3
-    for car in car_names():
+    for car in STANDARD_CARS:
         assert np.abs(drives[name, car].channels["path_offset_m"]).max() < bound
 
 
 @pytest.mark.parametrize(
     "maneuver", [DoubleLaneChange(), ObstacleAvoidance(), Slalom()], ids=lambda m: m.name
 )
-@pytest.mark.parametrize("name", car_names())
+@pytest.mark.parametrize("name", STANDARD_CARS)
 def test_no_cone_is_hit(drives, maneuver, name):
     """The whole width of the body, from end to end, stays between the cones."""
     car = get_car(name)
@@ -179,7 +180,7 @@ def test_lane_change_of_the_paper(drives):
 
 def test_step_steer_reaches_its_acceleration(drives):
     """4 m/s^2 is that of the linear range; saturating tires and drive load leave 10 % less or more."""
-    for car in car_names():
+    for car in STANDARD_CARS:
         trace = drives["step-steer", car]
         held = (trace.time > 5.0) & (trace.time < 5.8)
         assert trace.channels["lateral_acceleration_m_s2"][held].mean() == pytest.approx(4.0, rel=0.1)
