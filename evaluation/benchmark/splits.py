@@ -23,7 +23,8 @@ import numpy as np
 from ...envs.car import get_car
 from ...envs.cues import CueTrace
 from ...envs.errors import look_up
-from ...envs.maneuvers import RandomDrives, get_maneuver, get_recording, recording_names
+from ...envs.maneuvers import get_maneuver, get_recording, recording_names
+from ...envs.maneuvers.sampling import HELD_OUT_SEEDS, held_out_drives, load_drives
 from ...envs.settings import to_dict
 from ...envs.simulator.simulator import TIME_STEP
 
@@ -46,8 +47,6 @@ STANDARD: Final = (
 )
 """Maneuvers of the split ``standard``; those that another package registers are none of them."""
 
-HELD_OUT_SEED: Final = 2**32
-"""First seed of the split ``held-out``. ``drive_seeds`` draws seeds below it, for all training and tuning."""
 HELD_OUT_DRIVES: Final = 200
 HELD_OUT_DURATION: Final = 30.0
 """Of a drive of the split ``held-out``, s."""
@@ -131,34 +130,26 @@ def recorded_split() -> Split:
     )
 
 
-def held_out_split() -> Split:
-    """Random drives with seeds of their own."""
-    return random_split(HELD_OUT_DRIVES, HELD_OUT_DURATION)
-
-
-def random_split(count: int, duration: float) -> Split:
-    """The first random drives of the split ``held-out``.
+def held_out_split(count: int = HELD_OUT_DRIVES, duration: float = HELD_OUT_DURATION) -> Split:
+    """Random drives of the preset ``held-out``: seeds, cars and drivers that no training or tuning draws.
 
     Args:
         count: How many.
         duration: Of each, s.
     """
-    from ...envs.car.simulation import simulate
-
-    source = RandomDrives(track=0.2, hilly=0.2, strip=0.2, cones=0.2, roughness=(0.0, 256.0))
-    seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + count)
+    source = load_drives("held-out")
     return Split(
         name="held-out",
         version=1,
-        description="random drives whose seeds no training or tuning draws",
+        description="random drives by other drivers in other cars, with seeds that no training draws",
         definition={
-            "first_seed": HELD_OUT_SEED,
+            "first_seed": HELD_OUT_SEEDS,
             "count": count,
             "duration": duration,
             "drives": to_dict(source),
             "cars": {name: to_dict(get_car(name)) for name in source.cars},
         },
-        make=lambda: simulate([source.plan(seed, duration) for seed in seeds]),
+        make=lambda: held_out_drives(count, duration, source),
     )
 
 

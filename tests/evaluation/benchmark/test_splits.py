@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,21 +11,22 @@ import numpy as np
 import pytest
 
 from motion_cueing.envs.errors import UnknownNameError
-from motion_cueing.envs.maneuvers import RandomDrives, drive_seeds, recording_names
+from motion_cueing.envs.maneuvers import drive_seeds, recording_names
+from motion_cueing.envs.maneuvers.sampling import HELD_OUT_SEEDS, RandomDrives, load_drives
 from motion_cueing.evaluation.benchmark.splits import (
     HELD_OUT_DRIVES,
-    HELD_OUT_SEED,
     SPLITS,
     STANDARD,
     fingerprint,
     get_split,
-    random_split,
+    held_out_split,
     recorded_split,
     same_drive,
     standard_split,
 )
 
 from ...baselines.drives import trace, weave
+from ...repository import ROOT
 
 
 def test_there_are_three_splits():
@@ -37,7 +39,7 @@ def test_no_seed_of_the_split_can_be_drawn():
     """``drive_seeds`` is the one source of seeds of training and tuning: 32 bits, whatever its own seed."""
     for seed in (0, 7, 2**31, 2**32, 2**40):
         drawn = drive_seeds(4096, seed)
-        assert max(drawn) < HELD_OUT_SEED
+        assert max(drawn) < HELD_OUT_SEEDS
         assert min(drawn) >= 0
     definition = SPLITS["held-out"]().definition
     assert definition["first_seed"] >= 2**32
@@ -66,15 +68,15 @@ print(*(make().hash for make in SPLITS.values()))
 
 def test_a_hash_is_the_same_in_every_run():
     printed = subprocess.run(
-        [sys.executable, "-c", HASHES], capture_output=True, text=True, check=True, env=None
+        [sys.executable, "-c", HASHES], capture_output=True, text=True, check=True
     ).stdout
     assert printed.split() == [make().hash for make in SPLITS.values()]
 
 
 def test_a_hash_changes_with_the_drives():
-    few = random_split(2, 3.0)
-    assert few.hash == random_split(2, 3.0).hash
-    others = [random_split(3, 3.0), random_split(2, 3.5), replace(few, version=2), replace(few, name="x")]
+    few = held_out_split(2, 3.0)
+    assert few.hash == held_out_split(2, 3.0).hash
+    others = [held_out_split(3, 3.0), held_out_split(2, 3.5), replace(few, version=2), replace(few, name="x")]
     assert len({few.hash, *(one.hash for one in others)}) == 5
     standard = standard_split()
     maneuvers = {**standard.definition["maneuvers"]}
@@ -84,12 +86,12 @@ def test_a_hash_changes_with_the_drives():
 
 
 def test_the_drives_of_a_split_are_the_same_every_time():
-    first, again = random_split(2, 3.0), random_split(2, 3.0)
+    first, again = held_out_split(2, 3.0), held_out_split(2, 3.0)
     assert [one.digest() for one in first.cues.values()] == [one.digest() for one in again.cues.values()]
     assert len({one.digest() for one in first.cues.values()}) == 2
     assert all(one.duration == pytest.approx(3.0) for one in first.cues.values())
     seeds = [int(name.rpartition("-")[2]) for name in first.cues]
-    assert seeds == [HELD_OUT_SEED, HELD_OUT_SEED + 1]
+    assert min(seeds) >= HELD_OUT_SEEDS
 
 
 def test_a_fingerprint_is_the_rms_of_each_axis_and_bears_rounding_alone():
@@ -105,7 +107,12 @@ def test_a_fingerprint_is_the_rms_of_each_axis_and_bears_rounding_alone():
     assert not same_drive(found, fingerprint(trace(1.9, weave)))
 
 
-def test_drives_of_training_are_drawn_by_their_seeds():
-    """The same seed gives the same drive, so that seeds which differ are what holds drives out."""
-    source = RandomDrives()
-    assert source.plan(HELD_OUT_SEED, 3.0).name != source.plan(0, 3.0).name
+def test_the_cars_of_the_split_are_in_no_distribution_that_is_trained_or_tuned_on():
+    held_out = set(load_drives("held-out").cars)
+    assert len(held_out) >= 3
+    assert not held_out & set(RandomDrives().cars)
+    assert not held_out & set(load_drives("broad").cars)
+    recipes = [*ROOT.glob("train/**/*.yaml"), *ROOT.glob("baselines/**/*.yaml")]
+    assert recipes
+    named = {path.name: held_out & set(re.findall(r"[\w-]+", path.read_text())) for path in recipes}
+    assert not any(named.values()), named
