@@ -64,7 +64,10 @@ def test_it_writes_goes_on_and_compares(tmp_path, capsys, monkeypatch):
     capsys.readouterr()
     assert main(pair) == 0
     shown = capsys.readouterr().out
-    assert "0.00 (0.00" in shown or "0.000" in shown
+    (row,) = [line.strip("│ ").split("│") for line in shown.splitlines() if "│ no-motion" in line]
+    first, second, change = (float(cell) for cell in row[-3:])
+    assert first == second > 0.0
+    assert change == 0.0
     assert "paper, classical-tuned: only in a" in shown
     result["splits"][0]["hash"] = "0" * 64
     (tmp_path / "b" / "benchmark.json").write_text(json.dumps(result))
