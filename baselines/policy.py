@@ -37,7 +37,7 @@ An object that has ``predict`` alone need not inherit: every function that takes
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
@@ -64,12 +64,20 @@ class Information:
     """What a policy knows of the drive.
 
     Args:
-        kind: "now": the cues up to now. "preview": also those of the next ``seconds``. "drive": all of it.
+        kind: "now": the cues up to now. "controls": also the driver's steering wheel and pedals, which move
+            before the car does. "road": also the road ahead. "preview": also the true cues of the next
+            ``seconds``. "drive": all of it.
         seconds: Length of the preview, s.
     """
 
-    kind: Literal["now", "preview", "drive"] = "now"
+    kind: Literal["now", "controls", "road", "preview", "drive"] = "now"
     seconds: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """In tables: ``now``, ``controls``, ``road``, ``2 s true`` or ``whole drive``."""
+        names = {"preview": f"{self.seconds:g} s true", "drive": "whole drive"}
+        return names.get(self.kind, self.kind)
 
     @classmethod
     def ahead(cls, seconds: float) -> Information:
@@ -91,6 +99,7 @@ class Policy:
         information: What it knows of the drive.
         platform: The machine it was made for; None for any.
         task: The environment whose observations it sees; None where it sees the simulator's rows.
+        side_by_side: Whether it may be called for several drives in turn: it keeps nothing in itself.
     """
 
     name: str = ""
@@ -99,6 +108,7 @@ class Policy:
     information: Information = NOW
     platform: Platform | None = None
     task: TaskOptions | None = None
+    side_by_side: bool = True
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
@@ -237,6 +247,7 @@ class Wrapper(Policy):
         self.inner = policy
         self.name, self.parameters, self.time_step = policy.name, policy.parameters, policy.time_step
         self.information, self.platform, self.task = policy.information, policy.platform, policy.task
+        self.side_by_side = policy.side_by_side
 
     @property
     def start_pose(self) -> Array:
@@ -282,36 +293,6 @@ class Wrapper(Policy):
         return self.inner.predict(observation, state, episode_start, deterministic)
 
 
-class OneEach(Policy):
-    """Policies side by side, one for each machine of a batch."""
-
-    def __init__(self, policies: Sequence[Policy]) -> None:
-        self._policies = list(policies)
-        self.name, self.parameters = policies[0].name, policies[0].parameters
-
-    @property
-    def start_pose(self) -> Array:
-        """(n, 9) pose of each."""
-        return np.array([policy.start_pose for policy in self._policies])
-
-    def connect(self, machines: Machines) -> Interface:
-        """The machines as each of the policies sees them."""
-        return self._policies[0].connect(machines)
-
-    def predict(
-        self, observation: Array, state: Any = None, episode_start: Starts = None, deterministic: bool = True
-    ) -> tuple[Array, list[Any]]:
-        """What each answers to its row of observations (n, size)."""
-        n = len(self._policies)
-        states = [None] * n if state is None else state
-        rows = [None] * n if episode_start is None else np.split(np.asarray(episode_start), n)
-        answers = [
-            policy.predict(observation[i : i + 1], states[i], rows[i], deterministic)
-            for i, policy in enumerate(self._policies)
-        ]
-        return np.concatenate([np.atleast_2d(action) for action, _ in answers]), [own for _, own in answers]
-
-
 # Objects that are no Policy: the one place where their attributes are looked for.
 
 _EARLIER: Final = {"time_step": "dt", "start_pose": "start", "statistics": "notes"}
@@ -328,6 +309,8 @@ class _Adapter:
         # Modules of PyTorch have a method of this name.
         self.parameters = None if callable(parameters) else parameters
         self._for_drive: Callable[[CueTrace], Any] | None = getattr(given, "for_drive", None)
+        # It promised nothing, unless it says so.
+        self.side_by_side = bool(self._own("side_by_side", False))
 
     def _own(self, name: str, default: Any) -> Any:
         return getattr(self._given, name, getattr(self._given, _EARLIER.get(name, name), default))

@@ -177,7 +177,7 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
 
     A file is never labeled as a shipped policy: normalized scores refer to those.
     """
-    from ..evaluation.benchmark import benchmark_policies
+    from ..evaluation.benchmark.table import benchmark_policies
     from ..evaluation.policies import default_policies, is_reference, name_of_reference, policy_names
     from ..evaluation.suite import labels
 

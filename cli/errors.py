@@ -32,6 +32,12 @@ OLD_FLAGS: Final[Mapping[str, Mapping[str, str]]] = {
         "--search": "--search is a command of its own now: motion-cueing search --trials N",
         "--population": "--population is a command of its own now: motion-cueing population --members N",
     },
+    "benchmark": {
+        "--maneuvers": "the benchmark's drives are fixed; `motion-cueing evaluate --policies benchmark "
+        "--maneuvers ...` drives its policies in others",
+        "--car": "the benchmark's cars are fixed; `motion-cueing evaluate --policies benchmark --car ...` "
+        "drives its policies in another",
+    },
     "robustness": {"--fierceness": "--fierceness is called --time-scaling now"},
     "tune": {"--budget": "--budget is called --hours now"},
     "endure": {"--only": "--only is called --seeds now"},

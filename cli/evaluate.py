@@ -1,4 +1,4 @@
-"""``motion-cueing evaluate``, ``benchmark`` and ``paper``: drives, with tables, figures and a report."""
+"""``motion-cueing evaluate`` and ``paper``: drives, with tables, figures and a report."""
 
 from __future__ import annotations
 
@@ -54,22 +54,6 @@ class EvaluateCommand:
     """Version of the standard maneuvers that `all` stands for."""
     scale: ScaleText = "1"
     out: OutFolder = Path("results")
-
-
-@dataclass(frozen=True, kw_only=True)
-class BenchmarkCommand:
-    """Evaluate every controller of the benchmark, and rank them over all maneuvers.
-
-    Writes what `motion-cueing evaluate` writes. A controller that cannot drive the motion base is skipped.
-    The optimum takes minutes a drive. Policies of your own are driven beside the benchmark with
-    `--policies benchmark mine.yaml`.
-    """
-
-    policies: PolicyNames = (BENCHMARK,)
-    maneuvers: ManeuverNames = (ALL,)
-    platform: PlatformName = "paper"
-    car: CarName = "sedan"
-    out: OutFolder = Path("benchmark")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,14 +121,6 @@ def run(command: EvaluateCommand) -> int:
     return report(make_plan(command, words_of("evaluate", command)), BENCHMARK in command.policies)
 
 
-def run_benchmark(command: BenchmarkCommand) -> int:
-    """Evaluate the benchmark; the exit status is 1 if a drive failed."""
-    from ..evaluation.reporting.text import words_of
-
-    plan = make_plan(EvaluateCommand(**vars(command)), words_of("benchmark", command))
-    return report(plan, ranked=True)
-
-
 def run_paper(command: PaperCommand) -> int:
     """Reproduce the paper; the exit status is 1 if a number fails."""
     check_folder("--out", command.out)
@@ -161,7 +137,7 @@ def report(plan: Plan, ranked: bool) -> int:
         plan: What is driven.
         ranked: Whether the table of the benchmark is printed as well.
     """
-    from ..evaluation.benchmark import benchmark_table
+    from ..evaluation.benchmark.table import benchmark_table
     from ..evaluation.reporting.tables import feel_tables, print_results
     from ..evaluation.reporting.text import print_table, save_markdown, table_console
 
@@ -245,7 +221,7 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
 
 def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
     """Write results.json, results.csv, the benchmark and report.html into a folder."""
-    from ..evaluation.benchmark import save_benchmark
+    from ..evaluation.benchmark.table import save_benchmark
     from ..evaluation.reporting.figures import benchmark_figure, png
     from ..evaluation.reporting.report import save_report
 

@@ -65,12 +65,12 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "open report.html in --out; `motion-cueing render` shows a drive",
     ),
     "benchmark": Command(
-        ".evaluate",
+        ".benchmark",
         "BenchmarkCommand",
-        "evaluate every controller of the benchmark, from no motion to the optimum",
-        "--maneuvers lane-change --out benchmark",
-        "open report.html in --out; benchmark.md has the table",
-        run="run_benchmark",
+        "compare policies over fixed drives, with intervals",
+        "--policies classical-tuned learned --workers 2 --out benchmark",
+        "read benchmark.md in --out; --compare sets two results side by side",
+        goes_on=True,
     ),
     "paper": Command(
         ".evaluate",

@@ -151,7 +151,7 @@ def run_robustness(command: RobustnessCommand) -> int:
 def make_study(command: RobustnessCommand) -> Study:
     """Everything but the policies, all names resolved."""
     from ..envs.maneuvers import maneuver_names
-    from ..evaluation.benchmark import benchmark_policies
+    from ..evaluation.benchmark.table import benchmark_policies
     from ..evaluation.policies import policy_names
     from ..evaluation.studies.disturbances import Disturbances, SensorNoise, Study
 

@@ -81,7 +81,7 @@ def demonstrate(demonstrator: Demonstrator, name: str, cues: CueTrace) -> tuple[
     def keep(step: int, steps: int) -> None:
         observations.append(np.array(run.observation[0], dtype=np.float64))
 
-    trajectory = trajectory_of(record(run, keep), run)
+    trajectory = trajectory_of(record(run, keep)[0], run)
     before = slice(0, len(trajectory) - 1)
     axes = (trajectory.carriage, trajectory.hexapod, trajectory.turntable)
     rates = (trajectory.carriage_rate, trajectory.hexapod_rate, trajectory.turntable_rate)

@@ -107,7 +107,7 @@ class LoopLog:
         machines = Machines([cues], [platform], None, get_vestibular_model(vestibular))
         run = Rollout(_Replay(as_policy(policy), rows["action"]), machines, start)
         steps = {f"loop_{state.name.lower()}": str(int((states == state).sum())) for state in State}
-        trajectory = trajectory_of(record(run), run)
+        trajectory = trajectory_of(record(run)[0], run)
         return replace(
             trajectory,
             step_time=np.append(math.nan, rows["seconds"][:-1]),

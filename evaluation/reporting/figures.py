@@ -20,7 +20,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FuncFormatter
 
 from ...envs.platform.kernels import ACTUATORS
-from ..benchmark import benchmark
+from ..benchmark.table import benchmark
 from ..comparison import STILL, normalized_score
 from ..metrics import CUE_AXES, Criteria, cab_motion, cue_error, tilt_rate
 from ..results import Results

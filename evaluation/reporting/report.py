@@ -20,7 +20,7 @@ from jinja2 import Environment, StrictUndefined
 
 from ...envs.settings import to_dict
 from ...envs.storage import write_text
-from ..benchmark import benchmark_table
+from ..benchmark.table import benchmark_table
 from ..metrics import METRICS, ActuatorMetrics, AxisMetrics, Criteria, Metrics, References, declared
 from ..results import Results
 from .tables import (

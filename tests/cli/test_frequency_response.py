@@ -65,7 +65,7 @@ class Tired:
 def benchmark(monkeypatch):
     """A benchmark of three: one that can be tested, one that knows its drives alone, one that fails."""
     monkeypatch.setattr(
-        "motion_cueing.evaluation.benchmark.benchmark_policies",
+        "motion_cueing.evaluation.benchmark.table.benchmark_policies",
         lambda known: ["no-motion", "classical-per-maneuver", "adaptive"],
     )
     made = policies.make_policy

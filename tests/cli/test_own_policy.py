@@ -15,6 +15,8 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation import Trajectory
 
+from ..evaluation.benchmark.small import small_split
+
 pytestmark = pytest.mark.slow
 
 MINE = """
@@ -59,6 +61,8 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "mine.py").write_text(MINE)
+    monkeypatch.setattr("motion_cueing.evaluation.benchmark.SPLITS", {"small": small_split})
+    monkeypatch.setattr("motion_cueing.evaluation.benchmark.splits.SPLITS", {"small": small_split})
     time = 0.01 * np.arange(31)
     force = np.column_stack([np.sin(time), np.zeros(31), np.full(31, -9.81)])
     CueTrace("short", time, force, np.zeros((31, 3))).to_csv(tmp_path / "short.csv")
@@ -73,7 +77,7 @@ TEST = ["--axes", "f_x", "--frequencies", "15", "--settling", "0.1"]
     ("words", "file"),
     [
         (["evaluate", "--policies", "mine.py:Nudge", *DRIVE], "results.json"),
-        (["benchmark", "--policies", "mine:Nudge", "no-motion", *DRIVE], "results.json"),
+        (["benchmark", "--policies", "mine:Nudge", "no-motion"], "benchmark.json"),
         (["compare", "--policies", "mine.py:Nudge", "--platforms", "paper", *DRIVE], "study.json"),
         (["robustness", "--policies", "mine.py:Nudge", *DRIVE], "study.json"),
         (["frequency-response", "--policies", "mine.py:Nudge", *TEST], "frequency-response.json"),

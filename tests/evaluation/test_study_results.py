@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motion_cueing.evaluation.benchmark import OLD_COLUMNS
+from motion_cueing.evaluation.benchmark.table import OLD_COLUMNS
 from motion_cueing.evaluation.metrics import METRICS, measure
 from motion_cueing.evaluation.studies.figures import heat_figure, lines_figure
 from motion_cueing.evaluation.studies.results import StudyResults, condition_table, summarize

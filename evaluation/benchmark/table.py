@@ -1,4 +1,4 @@
-"""The benchmark: every controller from no motion to the optimum over the same drives, one row a policy."""
+"""The table of an evaluation: each policy over the same drives, from no motion to the optimum."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from .comparison import common_drives
-from .metrics import CUE_AXES, METRICS, mean, over_drives
-from .reporting.tables import at_scale, policy_table
-from .reporting.text import TextTable, how_many, save_markdown
-from .results import Results, save_frame
+from ..comparison import common_drives
+from ..metrics import CUE_AXES, METRICS, mean, over_drives
+from ..reporting.tables import at_scale, policy_table
+from ..reporting.text import TextTable, how_many, save_markdown
+from ..results import Results, save_frame
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,4 +1,4 @@
-"""The benchmark: its policies, its rows, its files, and the normalized score in every table."""
+"""The table of an evaluation: its policies, its rows, its files, and the normalized score in every table."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from motion_cueing.evaluation.policies import policy_names
 from motion_cueing.evaluation.reporting.tables import maneuver_table, score_table, suite_table
 from motion_cueing.evaluation.results import Failure, Results
 
-from .examples import GAINS, ORIGIN, results_of
+from ..examples import GAINS, ORIGIN, results_of
 
-BEFORE = Path(__file__).parent / "before"
+BEFORE = Path(__file__).parents[1] / "before"
 
 
 def test_the_score_of_the_suite_is_that_of_the_means():
