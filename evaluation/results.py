@@ -17,7 +17,7 @@ from pydantic import JsonValue
 from typing_extensions import Self
 
 from ..envs.cues import UNSCALED, CueScale
-from ..envs.errors import ConfigurationError, DataError, reason
+from ..envs.errors import DataError, reason
 from ..envs.limits import LARGEST_RESULTS, parse_json, read_bytes
 from ..envs.provenance import now, package_version, plain, versions
 from ..envs.settings import configuration, from_dict, renamed, to_dict
@@ -156,20 +156,6 @@ class Failure:
     maneuver: str
     policy: str | None
     message: str
-
-
-def check_same_scale(scales: Mapping[str, CueScale]) -> None:
-    """Refuse to compare results whose references have different motion scales.
-
-    Args:
-        scales: By the name of the results.
-
-    Raises:
-        ConfigurationError: two differ.
-    """
-    if len(set(scales.values())) > 1:
-        each = ", ".join(f"{name} has {scale}" for name, scale in scales.items())
-        raise ConfigurationError(f"results of different motion scales cannot be compared: {each}")
 
 
 @configuration

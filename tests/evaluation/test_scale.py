@@ -17,7 +17,7 @@ from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.evaluation.metrics import measure
 from motion_cueing.evaluation.reporting.tables import suite_table
-from motion_cueing.evaluation.results import Results, check_same_scale
+from motion_cueing.evaluation.results import Results
 from motion_cueing.evaluation.rollout import rollout
 from motion_cueing.evaluation.suite import cues_of, scale_of
 from motion_cueing.evaluation.trajectory import Trajectory
@@ -87,12 +87,6 @@ def test_drives_of_different_scales_are_not_evaluated_together(lane_change):
     assert scale_of({}) == UNSCALED
     with pytest.raises(ConfigurationError, match="different motion scales"):
         scale_of(drives)
-
-
-def test_results_of_different_scales_are_not_compared():
-    check_same_scale({"a.json": HALF, "b.json": CueScale.parse("0.5")})
-    with pytest.raises(ConfigurationError, match=r"a.json has 0.5, b.json has 1"):
-        check_same_scale({"a.json": HALF, "b.json": UNSCALED})
 
 
 def test_results_say_their_scale(tmp_path):
