@@ -105,8 +105,8 @@ PANELS: Final[tuple[Panel, ...]] = (
         Panel(CUE_AXES[i], "Cues at the cab", title, "deg/s", _cue(i, True), 5.0, _cue(i, False))
         for i, title in enumerate(_RATES, 3)
     ),
-    Panel("error", "Error", "Cue error, mean over 1 s", "J", running_error, 1.0, from_zero=True),
-    Panel("gathered", "Error", "Cue error so far, to J", "J", gathered_error, 0.5, from_zero=True),
+    Panel("error", "Error", "Cue error, mean over 1 s", "", running_error, 1.0, from_zero=True),
+    Panel("gathered", "Error", "Cue error so far, to J at the end", "", gathered_error, 0.5, from_zero=True),
     Panel(
         "step_time", "Error", "Time of a step", "µs",
         lambda drive, _: 1e6 * drive.step_time, logarithmic=True,

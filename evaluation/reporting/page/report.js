@@ -159,7 +159,8 @@
   function drawBehind(u) {
     const { ctx, bbox } = u;
     ctx.save();
-    for (const name of shown()) {
+    const bar = 3 * devicePixelRatio;
+    for (const [i, name] of shown().entries()) {
       const [begin, end] = state.drive.policies[name].worst;
       const left = Math.max(u.valToPos(begin, "x", true), bbox.left);
       const right = Math.min(u.valToPos(end, "x", true), bbox.left + bbox.width);
@@ -168,7 +169,7 @@
       ctx.globalAlpha = 0.1;
       ctx.fillRect(left, bbox.top, right - left, bbox.height);
       ctx.globalAlpha = 1;
-      ctx.fillRect(left, bbox.top - 4 * devicePixelRatio, right - left, 4 * devicePixelRatio);
+      ctx.fillRect(left, bbox.top + (i % 6) * bar, right - left, bar);
     }
     ctx.restore();
   }
@@ -347,7 +348,8 @@
     for (const u of state.phases) fillPhase(u);
     const u = state.overview;
     const left = u.valToPos(state.from, "x"), right = u.valToPos(state.to, "x");
-    u.setSelect({ left, width: right - left, top: 0, height: u.over.clientHeight }, false);
+    const [first, last] = span(), whole = state.to - state.from >= last - first;
+    u.setSelect({ left, width: whole ? 0 : right - left, top: 0, height: u.over.clientHeight }, false);
     byId("from").value = state.from.toFixed(2);
     byId("to").value = state.to.toFixed(2);
   }
@@ -372,7 +374,7 @@
     const table = element("table");
     for (const { label, policy, x } of rows(u, index)) {
       const line = element("td", {}, sample(policy), " ", label);
-      table.append(element("tr", {}, line, element("td", {}, `${number(x)} ${u.panel.unit}`)));
+      table.append(element("tr", {}, line, element("td", {}, `${number(x)} ${u.panel.unit}`.trim())));
     }
     tip.replaceChildren(element("b", {}, `${state.moment.toFixed(2)} s`), table);
     const box = u.over.getBoundingClientRect();
@@ -570,7 +572,7 @@
     const panel = about.panels.find((one) => one.name === "error");
     const found = lines(panel), [first, last] = span();
     state.overview = new uPlot({
-      width: Math.max(holder.clientWidth, 200), height: 66, padding: [4, 8, 0, 8],
+      width: Math.max(holder.clientWidth, 200), height: 66, padding: [4, 20, 0, 12],
       scales: { x: { time: false, range: () => [first, last] }, y: { range: (_u, _low, high) => [0, Math.max(high || 0, 0.1)] } },
       axes: [axis(2, { size: 22, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`) }), { show: false }],
       series: [{}, ...found.map((line) => ({ ...series(line, panel), width: 1 }))],
@@ -603,7 +605,7 @@
       const caption = element("figcaption", {}, element("span", {}, unit ? `${title}, ${unit}` : title));
       if (note) caption.append(element("span", { class: "limit" }, note));
       const holder = element("div", { class: "chart" });
-      if (kind === "plot") Object.entries({ tabindex: "0", role: "group", "aria-label": `Plot: ${title}, ${unit}`, "aria-describedby": "help" })
+      if (kind === "plot") Object.entries({ tabindex: "0", role: "group", "aria-label": `Plot: ${title}${unit && ", "}${unit}`, "aria-describedby": "help" })
         .forEach(([key_, text]) => holder.setAttribute(key_, text));
       else Object.entries({ role: "img", "aria-label": title }).forEach(([key_, text]) => holder.setAttribute(key_, text));
       grid.append(element("figure", { class: kind }, caption, holder));
