@@ -32,7 +32,7 @@ def results_with(errors: dict[str, list[float]]) -> Results:
 
 
 def test_the_interval_of_many_drives_is_that_of_the_normal_distribution():
-    values = np.random.default_rng(1).normal(3.0, 0.5, size=(400, 1))
+    values = np.random.default_rng(1).normal(3.0, 0.5, size=(100, 1))
     low, high = np.percentile(resampled_means(values), [2.5, 97.5])
     half = 1.96 * values.std(ddof=1) / np.sqrt(len(values))
     assert (low, high) == pytest.approx((values.mean() - half, values.mean() + half), abs=0.05 * half)
