@@ -1,4 +1,4 @@
-"""``motion-cueing evaluate`` and ``paper``: drives, with tables, figures and a report."""
+"""``motion-cueing evaluate`` and ``paper``: drives, with tables and a report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ..envs.errors import ConfigurationError
 from ..envs.progress import drives_progress
-from ..envs.storage import check_folder, check_own_json, write_bytes
+from ..envs.storage import check_folder, check_own_json
 from . import arguments
 from .arguments import (
     ALL,
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ..envs.car import Car
     from ..envs.cues import CueScale, CueTrace
     from ..envs.platform import Platform
+    from ..evaluation.reporting.packing import PackedDrive
     from ..evaluation.results import Results
     from ..evaluation.suite import CueSource, Drive, Outcome
     from ..evaluation.trajectory import Trajectory
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 class EvaluateCommand:
     """Drive maneuvers with policies, and say which policy is better, by how much, and why.
 
-    Writes results.json, results.csv, report.html, the benchmark over all maneuvers, one figure a maneuver,
-    and every trajectory. Without --policies it drives the ones that are meant for comparison.
+    Writes results.json, results.csv, report.html, the benchmark over all maneuvers, and every trajectory.
+    Without --policies it drives the ones that are meant for comparison.
     """
 
     policies: PolicyNames = ()
@@ -53,6 +54,8 @@ class EvaluateCommand:
     suite: Literal[1, 2] = 1
     """Version of the standard maneuvers that `all` stands for."""
     scale: ScaleText = "1"
+    figures: bool = False
+    """Draw figures for print as well, in PDF and PNG: one a maneuver, and the benchmark."""
     out: OutFolder = Path("results")
 
 
@@ -78,6 +81,7 @@ class Plan:
         scale: Motion scale of the reference.
         skipped: Policies of the benchmark that cannot be driven here, and why; what is left out of a replay.
         feel: Whether the tables of what people feel are shown and written.
+        figures: Whether figures for print are drawn.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -89,11 +93,12 @@ class Plan:
     scale: CueScale
     skipped: Mapping[str, str] = field(default_factory=dict)
     feel: bool = False
+    figures: bool = False
 
 
 @dataclass(eq=False)
 class _Output:
-    """Writes what belongs to one maneuver as soon as it is driven; keeps the figures for the report.
+    """Writes what belongs to one maneuver as soon as it is driven; keeps what the report plots.
 
     Maneuvers and policies are labels with their part of a file name.
     """
@@ -101,17 +106,21 @@ class _Output:
     folder: Path
     maneuvers: Mapping[str, str]
     policies: Mapping[str, str]
-    figures: dict[str, bytes] = field(default_factory=dict)
+    figures: bool
+    packed: dict[str, PackedDrive] = field(default_factory=dict)
 
     def finish(self, maneuver: str, drives: Mapping[str, Trajectory]) -> None:
-        """Save trajectories and figure of a maneuver."""
-        from ..evaluation.reporting.figures import maneuver_figure, png
+        """Save the trajectories of a maneuver, and its figure where figures are drawn."""
+        from ..evaluation.reporting.packing import pack
 
         for policy, drive in drives.items():
             name = f"{self.maneuvers[maneuver]}--{self.policies[policy]}.npz"
             drive.save(self.folder / "trajectories" / name)
-        self.figures[maneuver] = png(maneuver_figure(drives, list(self.policies)))
-        write_bytes(self.folder / f"{self.maneuvers[maneuver]}.png", self.figures[maneuver])
+        self.packed[maneuver] = pack(drives)
+        if self.figures:
+            from ..evaluation.reporting.figures import maneuver_figure, save_figure
+
+            save_figure(maneuver_figure(drives, list(self.policies)), self.folder / self.maneuvers[maneuver])
 
 
 def run(command: EvaluateCommand) -> int:
@@ -141,8 +150,8 @@ def report(plan: Plan, ranked: bool) -> int:
     from ..evaluation.reporting.tables import feel_tables, print_results
     from ..evaluation.reporting.text import print_table, save_markdown, table_console
 
-    results, figures = evaluate(plan)
-    save(results, figures, plan.out)
+    results, drives = evaluate(plan)
+    save(results, drives, plan.out, plan.figures)
     if plan.feel:
         save_markdown(plan.out / "feel.md", *feel_tables(results))
     console = table_console()
@@ -191,6 +200,7 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         scale=scale_of(recorded) if recorded else scale,
         skipped=skipped,
         feel="feel" in command.metrics,
+        figures=command.figures,
     )
 
 
@@ -200,15 +210,15 @@ def _drive(policy: Any, platform: Platform, car: Car, cues: CueTrace) -> Traject
     return rollout(policy, cues, platform=platform, car=car)
 
 
-def evaluate(plan: Plan) -> tuple[Results, dict[str, bytes]]:
-    """Drive and measure everything; figures by maneuver come beside the results."""
+def evaluate(plan: Plan) -> tuple[Results, dict[str, PackedDrive]]:
+    """Drive and measure everything; drives for the report come beside the results, by maneuver."""
     from ..evaluation.reporting.text import file_names
     from ..evaluation.suite import run_suite
 
-    output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies))
+    output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies), plan.figures)
     with drives_progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
         outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance, costly=plan.feel)
-    return collect(plan, outcome), output.figures
+    return collect(plan, outcome), output.packed
 
 
 def collect(plan: Plan, outcome: Outcome) -> Results:
@@ -219,17 +229,18 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
     return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.skipped, notes=outcome.notes)
 
 
-def save(results: Results, figures: Mapping[str, bytes], folder: Path) -> None:
+def save(results: Results, drives: Mapping[str, PackedDrive], folder: Path, figures: bool = False) -> None:
     """Write results.json, results.csv, the benchmark and report.html into a folder."""
     from ..evaluation.benchmark.table import save_benchmark
-    from ..evaluation.reporting.figures import benchmark_figure, png
     from ..evaluation.reporting.report import save_report
 
     results.save_json(folder / "results.json")
     results.save_csv(folder / "results.csv")
-    figure = benchmark_figure(results)
-    image = None if figure is None else png(figure)
-    if image is not None:
+    if len(results.scores) > 1:
         save_benchmark(results, folder)
-        write_bytes(folder / "benchmark.png", image)
-    save_report(results, figures, folder / "report.html", image)
+    if figures:
+        from ..evaluation.reporting.figures import benchmark_figure, save_figure
+
+        if (figure := benchmark_figure(results)) is not None:
+            save_figure(figure, folder / "benchmark")
+    save_report(results, folder / "report.html", drives)

@@ -77,7 +77,9 @@ def test_the_wheel_holds_every_file_of_the_packages_and_no_other(wheel):
         "envs/maneuvers/recorded/city-drive/cues.csv.gz",
         "envs/maneuvers/recorded/city-drive/NOTICE.md",
         "envs/maneuvers/recorded/commute/NOTICE.md",
-        "evaluation/reporting/report.html",
+        "evaluation/reporting/page/report.html",
+        "evaluation/reporting/page/report.js",
+        "evaluation/reporting/page/uPlot.min.css",
     ],
 )
 def test_data_files_are_in_the_wheel(wheel, name):
@@ -87,7 +89,11 @@ def test_data_files_are_in_the_wheel(wheel, name):
 def test_licenses_are_in_the_wheel(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     licenses = {name.split(".dist-info/licenses/")[1] for name in names if ".dist-info/licenses/" in name}
-    notices = {path.as_posix() for path in package_files() if path.name.startswith("NOTICE")}
+    notices = {
+        path.as_posix()
+        for path in package_files()
+        if path.name.startswith("NOTICE") or path.name.endswith("-LICENSE.txt")
+    }
     assert licenses == {"LICENSE"} | notices
 
 

@@ -8,23 +8,35 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FuncFormatter
 
-from ...envs.platform.kernels import ACTUATORS
+from ...envs.storage import write_bytes
 from ..benchmark.table import benchmark
 from ..comparison import STILL, normalized_score
-from ..metrics import CUE_AXES, Criteria, cab_motion, cue_error, tilt_rate
+from ..metrics import Criteria
 from ..results import Results
-from ..trajectory import Floats, Trajectory
+from ..trajectory import Floats
+from .signals import (
+    COLORS,
+    MOST_SHOWN,
+    PANELS,
+    Drives,
+    Panel,
+    gathered_error,
+    in_order,
+    looks,
+    shown_at_first,
+)
 from .tables import SCORES, has_scores
 from .text import fraction, how_many, number
 
@@ -34,9 +46,6 @@ FLOOR: Final = 0.01
 """Least J on a logarithmic axis: what lies below is perfect to anyone, and is marked there."""
 LOWEST_SCORE: Final = -1.0
 """Least normalized score that is drawn; what lies below is marked there."""
-_COLORS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_DASHES: Final = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
-_STILL_STYLE: Final = {"color": "#8a8a8a", "linestyle": (0, (2, 2)), "linewidth": 1.0}
 
 RC: Final[Mapping[str, Any]] = {
     "axes.axisbelow": True,
@@ -44,7 +53,7 @@ RC: Final[Mapping[str, Any]] = {
     "axes.grid": True,
     "axes.labelsize": 8.5,
     "axes.linewidth": 0.7,
-    "axes.prop_cycle": cycler(color=_COLORS),
+    "axes.prop_cycle": cycler(color=COLORS),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",
@@ -58,6 +67,7 @@ RC: Final[Mapping[str, Any]] = {
     "grid.linewidth": 0.7,
     "legend.frameon": False,
     "lines.linewidth": 1.3,
+    "pdf.fonttype": 42,
     "savefig.facecolor": "white",
     "xtick.color": "#444444",
     "xtick.labelsize": 8,
@@ -82,12 +92,14 @@ def new_figure(width: float, height: float, **layout: Any) -> Figure:
 
 def line_styles(policies: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Color and dash of each policy; the same for the same list, so that all figures agree."""
-    moving = [name for name in policies if name != STILL]
-    styles: dict[str, dict[str, Any]] = {STILL: dict(_STILL_STYLE)}
-    for i, name in enumerate(moving):
-        dash = _DASHES[(i // len(_COLORS)) % len(_DASHES)]
-        styles[name] = {"color": _COLORS[i % len(_COLORS)], "linestyle": dash}
-    return {name: styles[name] for name in policies}
+    return {
+        name: {
+            "color": color,
+            "linestyle": (0, tuple(0.7 * length for length in dash)) if dash else "-",
+            **({"linewidth": 1.0} if name == STILL else {}),
+        }
+        for name, (color, dash) in looks(policies).items()
+    }
 
 
 def limit_lines(axes: Axes, low: float, high: float, used: float, unit: str, shown_from: float = 0.4) -> None:
@@ -102,11 +114,20 @@ def limit_lines(axes: Axes, low: float, high: float, used: float, unit: str, sho
         shown_from: Least share at which the lines are drawn, so that small motions stay readable.
     """
     if used >= shown_from:
-        for limit in (low, high):
+        for limit in filter(np.isfinite, (low, high)):
             axes.axhline(limit, color=LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
         return
     span = f"±{high:.3g}" if abs(low + high) < 1e-9 * abs(high) else f"{low:.3g} to {high:.3g}"
     axes.set_title(f"limit {span} {unit}", loc="right", color=LIMIT, fontsize=7.5, fontweight="normal")
+
+
+def save_figure(figure: Figure, stem: Path) -> None:
+    """Write ``stem.pdf``, which stays sharp at any size, and ``stem.png`` of 300 dots an inch."""
+    for suffix in ("pdf", "png"):
+        buffer = io.BytesIO()
+        with styled():
+            figure.savefig(buffer, format=suffix, dpi=300)
+        write_bytes(stem.with_name(f"{stem.name}.{suffix}"), buffer.getvalue())
 
 
 def png(figure: Figure) -> bytes:
@@ -117,96 +138,104 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-_CUES = (
-    ("Specific force x (surge)", "m/s²", 1.0),
-    ("Specific force y (sway)", "m/s²", 1.0),
-    ("Specific force z + g (heave)", "m/s²", 1.0),
-    ("Roll rate", "deg/s", np.degrees(1.0)),
-    ("Pitch rate", "deg/s", np.degrees(1.0)),
-    ("Yaw rate", "deg/s", np.degrees(1.0)),
-)
-_LEGS = slice(2, 8)
-_LINE = 0.075
-"""Height of a number beside the panels, as a share of a panel's."""
-_MOST = 8
-"""Policies that a figure shows; lines of more cannot be told apart."""
-_NAMES_A_LINE = 12
-"""Names of policies in a line of the caption."""
+_COLUMN: Final = 3.5
+"""Width of a column of a paper, inches."""
+_PANELS: Final = ("f_x", "f_y", "w_z", "tilt_rate", "legs", "gathered")
+"""Panels of a figure for print; the report has them all."""
+_LINE: Final = 0.2
+"""Height of a label beside a panel, as a share of the panel's."""
+_PRINT: Final = {
+    "axes.labelsize": 7,
+    "axes.titlesize": 7.5,
+    "lines.linewidth": 1.0,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+}
+_LABEL: Final = 6.5
+"""Size of the labels, points."""
 
-Drives = Mapping[str, Trajectory]
 Styles = Mapping[str, Mapping[str, Any]]
 
 
 def maneuver_figure(
-    drives: Drives, policies: list[str] | None = None, criteria: Criteria | None = None
+    drives: Drives,
+    policies: Sequence[str] | None = None,
+    criteria: Criteria | None = None,
+    panels: Sequence[str] = _PANELS,
 ) -> Figure:
-    """The figure of a maneuver: cues of car and simulator, tilt, travel, legs and limits, for each policy.
+    """The figure of a maneuver for one column of a paper, with labels beside the lines.
 
-    Of more than eight policies it shows the references of the score and the best; its caption names the rest.
+    Of more than four policies it shows the references of the score and the best by J.
 
     Args:
         drives: Trajectory of each policy (at least one), all of the same cues.
-        policies: All policies of the evaluation, so that each keeps its color from figure to figure, as far
-            as all are shown.
+        policies: The policies to show, as far as they were driven, if there are at most four.
         criteria: Thresholds to draw.
+        panels: Names of the panels, of :data:`~.signals.PANELS`, from top to bottom.
     """
     criteria = criteria or Criteria()
-    shown = shown_policies(drives, criteria)
-    others = [name for name in drives if name not in shown]
-    styles = line_styles(shown if others else policies or list(drives))
+    given = [name for name in policies or () if name in drives]
+    shown = given if 0 < len(given) <= MOST_SHOWN else shown_policies(drives, criteria)
+    styles = line_styles(shown)
     drives = {name: drives[name] for name in shown}
-    with styled():
-        figure = new_figure(13.0, 14.0)
-        grid = figure.subplots(5, 3, sharex=True)
-        for i, axes in enumerate(grid[:2].flat):
-            _cue(axes, drives, styles, i)
-        _tilt(grid[2], drives, styles, criteria)
-        _travel(grid[3], drives, styles)
-        _legs(grid[4, 0], drives, styles)
-        _limit_activity(grid[4, 1], drives, styles)
-        _error(grid[4, 2], drives, styles, criteria)
-        for axes in grid[-1]:
-            axes.set_xlabel("time (s)")
+    chosen = [next(panel for panel in PANELS if panel.name == name) for name in panels]
+    with styled(), mpl.rc_context(dict(_PRINT)):
+        figure = new_figure(_COLUMN, 0.4 + 1.1 * len(chosen))
+        column = figure.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, panel in zip(column, chosen, strict=True):
+            _panel(axes, panel, drives, styles, criteria)
+        for axes, panel in zip(column, chosen, strict=True):
+            if panel.name == "gathered":
+                _label_errors(axes, drives, styles, criteria)
+            elif axes is column[0]:
+                _label_lines(axes, panel, drives, styles, criteria)
+        column[-1].set_xlabel("time (s)")
         first = next(iter(drives.values()))
         title = f"{first.maneuver} (car {first.car}, motion base {first.platform})"
-        figure.suptitle(title, fontsize=13, x=0.01, ha="left")
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        columns = min(len(labels), 7)
-        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
-        if others:
-            lines = [", ".join(others[i : i + _NAMES_A_LINE]) for i in range(0, len(others), _NAMES_A_LINE)]
-            caption = "Shown: the references and the best. Numbers of the others are in the tables:\n"
-            legend.set_title(caption + ",\n".join(lines), FontProperties(size=8.5))
+        figure.suptitle(title, fontsize=8, x=0.01, ha="left")
     return figure
 
 
 def shown_policies(drives: Drives, criteria: Criteria) -> list[str]:
-    """The policies a figure shows: all, or of more than eight the references and the best by J."""
-    if len(drives) <= _MOST:
-        return list(drives)
-    errors = {name: float(np.mean(cue_error(*cab_motion(drive), criteria))) for name, drive in drives.items()}
-    references = [
-        name for name in (criteria.references.baseline, criteria.references.optimum) if name in drives
-    ]
-    best = [name for name in sorted(errors, key=errors.__getitem__) if name not in references]
-    chosen = {*references, *best[: _MOST - len(references)]}
-    return [*references, *(name for name in best if name in chosen)]
+    """The policies a figure shows: at most four, the references of the score and the best by J."""
+    errors = {name: float(gathered_error(drive, criteria)[-1]) for name, drive in drives.items()}
+    return shown_at_first(in_order(errors, criteria))
 
 
-def _label(axes: Axes, title: str, unit: str) -> None:
-    axes.set_title(title)
-    axes.set_ylabel(unit)
-    axes.margins(x=0.0)
-
-
-def _cue(axes: Axes, drives: Drives, styles: Styles, i: int) -> None:
-    title, unit, factor = _CUES[i]
+def _panel(axes: Axes, panel: Panel, drives: Drives, styles: Styles, criteria: Criteria) -> None:
     for name, drive in drives.items():
-        axes.plot(drive.time, factor * cab_motion(drive)[1][:, i], label=name, **styles[name])
-    car = next(iter(drives.values()))
-    axes.plot(car.time, factor * cab_motion(car)[0][:, i], color=CAR, linewidth=1.6, label="car", zorder=1.9)
-    _widen(axes, 1.0 if CUE_AXES[i].startswith("f") else 5.0)
-    _label(axes, title, unit)
+        values = panel.signal(drive, criteria)
+        steps = {"drawstyle": "steps-post"} if panel.levels else {}
+        if values.ndim == 2:
+            color = styles[name]["color"]
+            axes.fill_between(drive.time, *values.T, color=color, alpha=0.12, linewidth=0.0)
+        for column in np.atleast_2d(values.T):
+            axes.plot(drive.time, column, label=name, **styles[name], **steps)
+    first = next(iter(drives.values()))
+    if panel.car is not None:
+        axes.plot(first.time, panel.car(first, criteria), color=CAR, linewidth=1.4, label="car", zorder=1.9)
+    if panel.logarithmic:
+        axes.set_yscale("log")
+    else:
+        _widen(axes, panel.least)
+    if panel.from_zero:
+        axes.set_ylim(bottom=0.0)
+    axes.set_title(panel.title)
+    axes.set_ylabel(panel.unit)
+    axes.margins(x=0.0)
+    if panel.limits is not None:
+        low, high = panel.limits(first, criteria)
+        used = max(_used(panel.signal(drive, criteria), low, high) for drive in drives.values())
+        if panel.from_zero:
+            axes.set_ylim(0.0, max(axes.get_ylim()[1], 1.3 * high))
+            limit_lines(axes, low, high, 1.0, panel.unit)
+        elif np.isfinite(high):
+            limit_lines(axes, low, high, used, panel.unit)
+
+
+def _used(values: Floats, low: float, high: float) -> float:
+    """Largest share of the way to a limit."""
+    return float(max(np.nanmax(values) / high, np.nanmin(values) / low if np.isfinite(low) else 0.0))
 
 
 def _widen(axes: Axes, least: float) -> None:
@@ -217,67 +246,61 @@ def _widen(axes: Axes, least: float) -> None:
         axes.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
 
 
-def _tilt(row: Any, drives: Drives, styles: Styles, criteria: Criteria) -> None:
-    def curves(
-        axes: Axes, title: str, unit: str, signal: Callable[[Trajectory], Floats], least: float
-    ) -> None:
-        for name, drive in drives.items():
-            axes.plot(drive.time, np.degrees(signal(drive)), **styles[name])
-        _widen(axes, least)
-        _label(axes, title, unit)
-
-    curves(row[0], "Hexapod roll", "deg", lambda drive: drive.hexapod[:, 3], 2.0)
-    curves(row[1], "Hexapod pitch", "deg", lambda drive: drive.hexapod[:, 4], 2.0)
-    curves(row[2], "Tilt rate beyond the car's own", "deg/s", tilt_rate, 0.0)
-    row[2].set_ylim(0.0, max(row[2].get_ylim()[1], 1.3 * np.degrees(criteria.tilt_rate)))
-    row[2].axhline(np.degrees(criteria.tilt_rate), color=LIMIT, linewidth=0.9, linestyle=(0, (4, 2)))
+def _label_errors(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> None:
+    """Beside the end of each line the policy, its J and its normalized score."""
+    ends = {name: float(gathered_error(drive, criteria)[-1]) for name, drive in drives.items()}
+    references = criteria.references
+    baseline, optimum = ends.get(references.baseline), ends.get(references.optimum)
+    labels = {}
+    for name, end in ends.items():
+        score = normalized_score(end, baseline, optimum)
+        labels[name] = f"{name}\n{end:.2f}" if score is None else f"{name}\n{end:.2f} ({score:.2f})"
+    colors = {name: styles[name]["color"] for name in ends}
+    _annotate(axes, ends, labels, colors, 2.0 * _LINE)
 
 
-def _travel(row: Any, drives: Drives, styles: Styles) -> None:
-    for axes, i, title, unit in (
-        (row[0], 0, "Carriage x", "m"),
-        (row[1], 1, "Carriage y", "m"),
-        (row[2], 8, "Turntable", "deg"),
-    ):
-        factor = np.degrees(1.0) if unit == "deg" else 1.0
-        for name, drive in drives.items():
-            axes.plot(drive.time, factor * drive.positions[:, i], **styles[name])
-        _widen(axes, 0.5 * factor)
-        _limits(axes, drives, slice(i, i + 1), factor, unit)
-        _label(axes, title, unit)
+def _label_lines(axes: Axes, panel: Panel, drives: Drives, styles: Styles, criteria: Criteria) -> None:
+    """Beside the end of each line its policy."""
+    ends = {
+        name: float(np.atleast_2d(panel.signal(drive, criteria).T)[-1, -1]) for name, drive in drives.items()
+    }
+    colors = {name: styles[name]["color"] for name in ends}
+    if panel.car is not None:
+        ends["car"], colors["car"] = float(panel.car(next(iter(drives.values())), criteria)[-1]), CAR
+    _annotate(axes, ends, {name: name for name in ends}, colors, _LINE)
 
 
-def _legs(axes: Axes, drives: Drives, styles: Styles) -> None:
-    for name, drive in drives.items():
-        color = styles[name]["color"]
-        lowest, highest = drive.legs.min(axis=1), drive.legs.max(axis=1)
-        axes.fill_between(drive.time, lowest, highest, color=color, alpha=0.18, linewidth=0.0)
-        axes.plot(drive.time, lowest, drive.time, highest, **{**styles[name], "linewidth": 0.9})
-    _widen(axes, 0.1)
-    _limits(axes, drives, _LEGS, 1.0, "m")
-    _label(axes, "Legs, shortest to longest of the six", "m from neutral")
-
-
-def _limits(axes: Axes, drives: Drives, actuators: slice, factor: float, unit: str) -> None:
-    """Limits of actuators that share them, if there are any."""
-    table = next(iter(drives.values())).limits
-    low, high = table.position_min[actuators].max(), table.position_max[actuators].min()
-    if not (np.isfinite(low) and np.isfinite(high) and low < 0.0 < high):
-        return
-    positions = [drive.positions[:, actuators] for drive in drives.values()]
-    used = max(float(max(p.max() / high, p.min() / low)) for p in positions)
-    limit_lines(axes, factor * low, factor * high, used, unit)
-
-
-def _limit_activity(axes: Axes, drives: Drives, styles: Styles) -> None:
-    """For each policy the number of actuators at a limit."""
-    for name, drive in drives.items():
-        axes.plot(
-            drive.time, np.count_nonzero(drive.limits_active, axis=1), **styles[name], drawstyle="steps-post"
+def _annotate(
+    axes: Axes, ends: Mapping[str, float], labels: Mapping[str, str], colors: Mapping[str, str], line: float
+) -> None:
+    low, high = axes.get_ylim()
+    heights = _spread([(end - low) / (high - low) for end in ends.values()], line)
+    for (name, end), height in zip(ends.items(), heights, strict=True):
+        axes.annotate(
+            labels[name],
+            xy=(1.0, (end - low) / (high - low)),
+            xytext=(1.06, height),
+            xycoords="axes fraction",
+            textcoords="axes fraction",
+            annotation_clip=False,
+            color=_darker(colors[name]),
+            fontsize=_LABEL,
+            linespacing=0.95,
+            va="center",
+            arrowprops={
+                "arrowstyle": "-",
+                "color": colors[name],
+                "linewidth": 0.5,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
         )
-    axes.set_ylim(-0.2, len(ACTUATORS) + 0.2)
-    axes.set_yticks(range(0, len(ACTUATORS) + 1, 3))
-    _label(axes, "Actuators at a limit", f"of {len(ACTUATORS)}")
+
+
+def _darker(color: str) -> tuple[float, float, float]:
+    """A color for text on white."""
+    red, green, blue = to_rgb(color)
+    return 0.75 * red, 0.75 * green, 0.75 * blue
 
 
 def _spread(heights: list[float], least: float) -> list[float]:
@@ -291,27 +314,6 @@ def _spread(heights: list[float], least: float) -> list[float]:
         moved[i] = min(moved[i], highest)
         highest = moved[i] - least
     return [moved[i] for i in range(len(heights))]
-
-
-def _error(axes: Axes, drives: Drives, styles: Styles, criteria: Criteria) -> None:
-    """The cue error gathered so far; its last value is J, and beside it the normalized score."""
-    ends: dict[str, float] = {}
-    for name, drive in drives.items():
-        error = np.cumsum(cue_error(*cab_motion(drive), criteria)) / len(drive)
-        axes.plot(drive.time, error, **styles[name])
-        ends[name] = float(error[-1])
-    baseline, optimum = (
-        ends.get(name) for name in (criteria.references.baseline, criteria.references.optimum)
-    )
-    axes.set_ylim(bottom=0.0)
-    heights = _spread([end / axes.get_ylim()[1] for end in ends.values()], _LINE)
-    for (name, end), height in zip(ends.items(), heights, strict=True):
-        score = normalized_score(end, baseline, optimum)
-        text = f"{end:.2f}" if score is None else f"{end:.2f} ({score:.2f})"
-        style = {"color": styles[name]["color"], "fontsize": 8, "va": "center"}
-        axes.annotate(text, (1.01, height), xycoords="axes fraction", annotation_clip=False, **style)
-    scores = "" if baseline is None or optimum is None else " (normalized score)"
-    _label(axes, f"Cue error so far, to J{scores}", "J")
 
 
 _BAR_COLORS: Final = ("#0072b2", "#e69f00")

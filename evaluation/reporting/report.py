@@ -1,28 +1,34 @@
-"""The report: one HTML page with everything. It embeds its figures and needs no network.
+"""The report: one HTML page with everything. It draws its plots in the browser and needs no network.
+
+The page's template, styles and script are in ``page``; the drives in it are packed by ``packing.py``.
 
 :func:`definitions` makes the tables of the page of metrics from their declarations in ``metrics.py``.
 """
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import inspect
+import json
 import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 import yaml
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ...envs.settings import to_dict
 from ...envs.storage import write_text
 from ..benchmark.table import benchmark_table
-from ..metrics import METRICS, ActuatorMetrics, AxisMetrics, Criteria, Metrics, References, declared
+from ..metrics import METRICS, ActuatorMetrics, AxisMetrics, Criteria, Metrics, References, declared, mean
 from ..results import Results
+from .packing import MISSING, PackedDrive
+from .signals import PANELS, PHASES, in_order, looks, shown_at_first
+from .summary import chart, sentences, summarize
 from .tables import (
     axis_table,
     feel_table,
@@ -32,64 +38,121 @@ from .tables import (
     matrix_table,
     notes_table,
     score_table,
-    suite_table,
 )
-from .text import NOTHING, TextTable, markdown
+from .text import NOTHING, TextTable, fraction, markdown, microseconds, number
 
 _DARKEST: Final = 0.35
 """Opacity of the best cell of a row."""
 
 
-def render(results: Results, figures: Mapping[str, bytes], benchmark: bytes | None = None) -> str:
+def render(results: Results, drives: Mapping[str, PackedDrive] = MappingProxyType({})) -> str:
     """The page.
 
     Args:
         results: What to report.
-        figures: PNG by maneuver, as far as there are any.
-        benchmark: PNG of the benchmark.
+        drives: Drives to plot, by maneuver, as far as there are any.
     """
-    source = files(__package__).joinpath("report.html").read_text(encoding="utf-8")
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("motion_cueing.evaluation.reporting", "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     configuration = {"criteria": to_dict(results.criteria), **results.provenance.configuration}
-    return environment.from_string(source).render(
+    packed = {name: drives[name] for name in results.maneuvers if name in drives}
+    summaries = summarize(results)
+    return environment.get_template("report.html").render(
         results=results,
         definitions={name: METRICS[name].definition for name in ("cue_error", "perceived_cue_error")},
-        suite=suite_table(results),
+        summaries=summaries,
+        sentences=sentences(summaries, max((s.maneuvers for s in results.scores), default=0)),
+        sure=any(summary.error.low is not None for summary in summaries),
+        scored=any(score.normalized_score is not None for score in results.scores),
+        chart=chart(summaries),
         benchmark=benchmark_table(results),
-        benchmark_image=_embedded(benchmark),
         feel=feel_tables(results),
         matrix=matrix_table(results),
         scores=score_table(results),
         heat=_heat(results),
-        parts=[_part(results, name, figures.get(name)) for name in results.maneuvers],
+        parts=[_part(results, name, packed.get(name)) for name in results.maneuvers],
         configuration=yaml.safe_dump(configuration, sort_keys=False, allow_unicode=True),
+        number=number,
+        fraction=fraction,
+        microseconds=microseconds,
+        styles="\n".join(map(_asset, ("uPlot.min.css", "report.css"))),
+        scripts="\n".join(map(_asset, ("uPlot.iife.min.js", "report.js"))) if packed else _asset("report.js"),
+        about=_json(_about(results, packed)),
+        packed=[_json(drive.content) for drive in packed.values()],
     )
 
 
 def save_report(
-    results: Results, figures: Mapping[str, bytes], path: str | Path, benchmark: bytes | None = None
+    results: Results, path: str | Path, drives: Mapping[str, PackedDrive] = MappingProxyType({})
 ) -> None:
     """Write the page, whole or not at all."""
-    write_text(path, render(results, figures, benchmark))
+    write_text(path, render(results, drives))
 
 
-def _embedded(image: bytes | None) -> str | None:
-    return base64.b64encode(image).decode("ascii") if image else None
+def _asset(name: str) -> str:
+    return files("motion_cueing.evaluation.reporting.page").joinpath(name).read_text(encoding="utf-8")
 
 
-def _part(results: Results, maneuver: str, figure: bytes | None) -> dict[str, Any]:
+def _json(content: Any) -> str:
+    """JSON that may stand in a script: no name in it can end the script."""
+    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _about(results: Results, packed: Mapping[str, PackedDrive]) -> dict[str, Any]:
+    """What the script of the page must know: names, looks and panels."""
+    order = in_order(_mean_errors(results), results.criteria)
+    return {
+        "drives": list(packed),
+        "policies": order,
+        "shown": shown_at_first(order),
+        "styles": {name: {"color": color, "dash": dash} for name, (color, dash) in looks(order).items()},
+        "panels": [
+            {
+                "name": panel.name,
+                "group": panel.group,
+                "title": panel.title,
+                "unit": panel.unit,
+                "least": panel.least,
+                "from_zero": panel.from_zero,
+                "logarithmic": panel.logarithmic,
+                "levels": panel.levels,
+            }
+            for panel in PANELS
+        ],
+        "phases": [
+            {"title": title, "cue": cue, "tilt": tilt, "sign": sign} for title, cue, tilt, sign in PHASES
+        ],
+        "missing": MISSING,
+    }
+
+
+def _mean_errors(results: Results) -> dict[str, float]:
+    """Mean J of each policy over the drives that it finished."""
+    errors: dict[str, list[float]] = {}
+    for drives in results.maneuvers.values():
+        for name, metrics in drives.items():
+            errors.setdefault(name, []).append(metrics.cue_error)
+    return {name: mean(values) for name, values in errors.items()}
+
+
+def _part(results: Results, maneuver: str, packed: PackedDrive | None) -> dict[str, Any]:
     drives = results.maneuvers[maneuver]
+    policies = packed.about["policies"] if packed else {}
     return {
         "name": maneuver,
         "headline": maneuver_table(maneuver, drives, results.normalized_scores.get(maneuver)),
+        "worst": {name: policy["worst"] for name, policy in policies.items()},
         "verdict": next(verdict for verdict in results.verdicts if verdict.maneuver == maneuver),
         "feel": feel_table(maneuver, drives),
         "axes": axis_table(maneuver, drives),
         "machine": machine_table(maneuver, drives),
         "notes": notes_table(maneuver, results.notes.get(maneuver, {})),
-        "image": _embedded(figure),
     }
 
 

@@ -86,10 +86,8 @@ def test_evaluate_writes_everything(simulator, cue_file, tmp_path, capsys):
         "results.json",
         "results.csv",
         "report.html",
-        "bend.png",
         "benchmark.csv",
         "benchmark.md",
-        "benchmark.png",
         "trajectories",
     }
     results = Results.load_json(out / "results.json")
@@ -292,7 +290,7 @@ def test_the_label_of_a_compressed_file_is_its_stem(tmp_path):
 def test_maneuvers_with_like_names_have_their_own_files(simulator, tmp_path):
     files = [write_cues(tmp_path / name) for name in ("a b.csv", "a_b.csv", "A b.csv")]
     out = tmp_path / "out"
-    argv = ["evaluate", "--policies", "classical", "--out", out, "--maneuvers", *files]
+    argv = ["evaluate", "--policies", "classical", "--figures", "--out", out, "--maneuvers", *files]
     assert main([str(word) for word in argv]) == 0
     assert {file.name for file in out.glob("*.png")} == {"a_b.png", "a_b_2.png", "A_b_3.png"}
     driven = {

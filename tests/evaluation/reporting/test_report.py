@@ -6,13 +6,14 @@ import re
 
 import pytest
 
-from motion_cueing.evaluation.metrics import METRICS
-from motion_cueing.evaluation.reporting.figures import benchmark_figure, png
+from motion_cueing.evaluation.metrics import METRICS, measure
+from motion_cueing.evaluation.reporting.packing import pack
 from motion_cueing.evaluation.reporting.report import render
 from motion_cueing.evaluation.reporting.tables import maneuver_table
 from motion_cueing.evaluation.results import Failure, Provenance, Results
 
 from ..examples import GAINS, ORIGIN, results_of
+from ..synthetic import drive
 
 
 @pytest.fixture(scope="module")
@@ -26,28 +27,37 @@ def results() -> Results:
 
 
 def test_the_report_is_self_contained_and_escapes(results):
-    page = render(results, {"weave": b"\x89PNG"})
+    drives = {name: drive(gain, policy=name) for name, gain in GAINS.items()}
+    page = render(results, {"weave": pack(drives)})
     assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", page)
-    assert "http://" not in page
-    assert "https://" not in page
-    assert "data:image/png;base64,iVBORw==" in page
+    # The only addresses are those of uPlot's home and of a vocabulary; neither is loaded.
+    addresses = set(re.findall(r"https?://[\w./-]+", page))
+    assert addresses == {"https://github.com/leeoniya/uPlot", "http://www.w3.org/2000/svg"}
     assert "no &lt;b&gt;road&lt;/b&gt;" in page
     for text in ("weave", "no-motion", "mass: 1814.0", "indifference_force", "--policy"):
         assert text in page
 
 
+def test_no_name_can_end_the_script_that_holds_it():
+    name = "</script><img src=x onerror=alert(1)>"
+    measured = {"weave": {name: measure(drive(policy=name))}}
+    page = render(Results.of(measured, [], ORIGIN), {"weave": pack({name: drive(policy=name)})})
+    assert "<img" not in page
+    assert page.count("</script>") == page.count("<script")
+
+
 def test_the_report_has_the_benchmark_and_the_metrics_as_declared(results):
-    page = render(results, {}, png(benchmark_figure(results)))
+    page = render(results)
     assert "Benchmark, means over 2 drives" in page
     assert "(J of classical-tuned − J of\noptimum)" in page
     assert METRICS["cue_error"].definition in page
-    headers = re.findall("<th>(.*?)</th>", page)
+    headers = re.findall('<th scope="col">(.*?)</th>', page)
     for one in METRICS.values():
         assert (one.title in headers) == bool(one.tables)
 
 
 def test_a_report_without_a_drive_has_its_configuration():
-    assert "Configuration" in render(Results.of({}, [], ORIGIN), {})
+    assert "Configuration" in render(Results.of({}, [], ORIGIN))
 
 
 def test_the_table_lists_the_best_first(results):
