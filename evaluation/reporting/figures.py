@@ -9,7 +9,7 @@ import io
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -179,7 +179,7 @@ def maneuver_figure(
     styles = line_styles(shown)
     drives = {name: drives[name] for name in shown}
     chosen = [next(panel for panel in PANELS if panel.name == name) for name in panels]
-    with styled(), mpl.rc_context(dict(_PRINT)):
+    with styled(), mpl.rc_context(cast(Any, _PRINT)):
         figure = new_figure(_COLUMN, 0.4 + 1.1 * len(chosen))
         column = figure.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
         for axes, panel in zip(column, chosen, strict=True):
@@ -205,7 +205,7 @@ def shown_policies(drives: Drives, criteria: Criteria) -> list[str]:
 def _panel(axes: Axes, panel: Panel, drives: Drives, styles: Styles, criteria: Criteria) -> None:
     for name, drive in drives.items():
         values = panel.signal(drive, criteria)
-        steps = {"drawstyle": "steps-post"} if panel.levels else {}
+        steps: dict[str, Any] = {"drawstyle": "steps-post"} if panel.levels else {}
         if values.ndim == 2:
             color = styles[name]["color"]
             axes.fill_between(drive.time, *values.T, color=color, alpha=0.12, linewidth=0.0)
