@@ -204,7 +204,7 @@ def test_every_import_belongs_to_a_declared_dependency(wheel):
     declared = requirements(wheel)
     libraries = {"sbx", "skrl", "torchrl"}
     assert declared.keys() - libraries == {
-        "", "dev", "docs", "export", "loop", "optimal", "ray", "render", "train",
+        "", "dev", "docs", "export", "logs", "loop", "optimal", "ray", "render", "train",
     }  # fmt: skip
     assert libraries <= declared.keys()
     sources = [path for path in package_files() if path.suffix == ".py"]

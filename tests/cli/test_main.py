@@ -112,7 +112,7 @@ def test_a_maneuver_that_fails_leaves_the_others_and_exits_1(simulator, cue_file
 
 
 def test_an_interrupt_ends_with_130(simulator, cue_file, tmp_path, monkeypatch, capsys):
-    def interrupt(*_):
+    def interrupt(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("motion_cueing.evaluation.suite.run_suite", interrupt)

@@ -177,7 +177,7 @@ def test_a_file_runs_once(folder):
 
 
 def test_a_file_that_is_no_drive_is_refused_in_plain_words(folder, capsys):
-    for file, told in (("nowhere.npz", "there is no such file"), ("mine.py", "not a saved trajectory")):
+    for file, told in (("nowhere.npz", "there is no such file"), ("mine.py", "no .npz file, or broken")):
         assert main(["evaluate", "--replays", file, "--out", "out"]) == 2
         said = capsys.readouterr().err
         assert told in said
