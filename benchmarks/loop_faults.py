@@ -203,6 +203,9 @@ FAULTS: Final[dict[str, Fault]] = {
 }  # fmt: skip
 """What goes wrong, by name."""
 
+OTHER_DRIVES: Final = ("teleport into braking", "offset of 8 m/s^2 for 5 s")
+"""Faults after which the cues are those of another, fiercer drive; the bars are of the same one, and missed."""
+
 
 class Felt(NamedTuple):
     """What is felt in the cab over a drive.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -125,7 +126,7 @@ def test_the_same_command_goes_on_and_fresh_begins_anew(tmp_path, capsys):
         ),
     ):
         assert told in complaint([*words, *more], capsys)
-    config.write_text(config.read_text() + "\nlog_every: 17\n")
+    config.write_text(re.sub("log_every: .*", "log_every: 17", config.read_text()))
     assert f"--config {config}: {out} was begun with another log_every; " in complaint(words, capsys)
     assert "holds a training" in complaint(["search", *words[1:], "--trials", "2"], capsys)
 

