@@ -31,7 +31,7 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 	@echo "  PYTHON=python3.12 chooses the interpreter of a new $(VENV), OUT=DIR where results go."
 
-evaluate: $(BASE) ## All maneuvers with the default policies, and the paper's cases: tables, figures, reports
+evaluate: $(BASE) ## All maneuvers with the default policies, and the paper's cases: tables and reports
 	@$(BIN)/motion-cueing evaluate --out $(OUT)
 	@$(BIN)/motion-cueing paper --out $(OUT)/paper
 

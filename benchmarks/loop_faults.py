@@ -204,7 +204,7 @@ FAULTS: Final[dict[str, Fault]] = {
 """What goes wrong, by name."""
 
 OTHER_DRIVES: Final = ("teleport into braking", "offset of 8 m/s^2 for 5 s")
-"""Faults after which the cues are those of another, fiercer drive; the bars are of the same one, and missed."""
+"""Faults after which the cues are those of another, fiercer drive. The bars are of the same one: missed."""
 
 
 class Felt(NamedTuple):

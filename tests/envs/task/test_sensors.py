@@ -5,8 +5,8 @@ import pytest
 
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.maneuvers import get_maneuver
-from motion_cueing.envs.task import RandomizationOptions
 from motion_cueing.envs.simulator.kernels.observation import FIRST, SCALES
+from motion_cueing.envs.task import RandomizationOptions
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.options import load_task
 from motion_cueing.envs.task.sensors import CarSensors, sensed_drives
