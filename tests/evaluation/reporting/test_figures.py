@@ -51,7 +51,9 @@ def panels():
     return {axes.get_title("left"): axes for axes in figure.axes}
 
 
-@pytest.mark.parametrize("panel", [panel for panel in PANELS if panel.name != "step_time"], ids=lambda panel: panel.name)
+@pytest.mark.parametrize(
+    "panel", [panel for panel in PANELS if panel.name != "step_time"], ids=lambda panel: panel.name
+)
 def test_a_panel_shows_the_signal_of_each_policy_and_of_the_car(panels, panel):
     for name, one in DRIVES.items():
         signal = panel.signal(one, Criteria())
