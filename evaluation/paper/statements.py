@@ -211,7 +211,9 @@ def tilting(case: str, t: Trajectory, p: WashoutParameters, motion: Motion, rate
     # It is limited throughout: it must always move towards its angle.
     pitch = np.cumsum(rates[:, 1]) * t.dt
     away = np.abs(target - pitch) > _AWAY
-    towards = float(np.mean(np.sign(rates[away, 1]) == np.sign((target - pitch)[away])))
+    # A tilt that is never away from its angle is not limited.
+    moves = np.sign(rates[away, 1]) == np.sign((target - pitch)[away])
+    towards = float(moves.mean()) if away.any() else 0.0
     checks.append(
         Check(case, "share of time in which tilt moves to N fL", "Eq. (19)", towards, "", 0.99, 1.0)
     )
