@@ -21,7 +21,7 @@ from .errors import DataError
 
 try:
     import fcntl
-except ImportError:  # Windows: two processes in one folder are not told apart there.
+except ImportError:  # Windows: two processes in one folder are not distinguished there.
     fcntl = None  # type: ignore[assignment]
 
 _LONGEST_NAME: Final = 255

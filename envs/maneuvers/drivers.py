@@ -39,7 +39,7 @@ class Drivers:
         lane_wander: Standard deviation of the line aimed at, m.
         wander_time: Its correlation time, s.
         steering_noise: Standard deviation of errors of the steering wheel, rad.
-        pedal_noise: Standard deviation of errors of the acceleration asked for, m/s^2.
+        pedal_noise: Standard deviation of errors of the requested acceleration, m/s^2.
         shift_pace: Factor on the time of a manual shift.
         catch_up: Largest acceleration to make up for being late, m/s^2; 0 for no bound.
         patience: How far the plan may get ahead of the car before it waits, m; 0 for a plan that never does.

@@ -236,7 +236,7 @@ def _clearance_after(hexapod: Hexapod, start: Floats, way: Floats) -> Floats:
     pose = start
     extensions, jacobian, clearance = _clearances(hexapod, pose)
     target = extensions + way
-    # What does not close runs away; it is told by its error.
+    # What does not close runs away; its error shows it.
     with np.errstate(all="ignore"):
         for _ in range(_LOOK_ITERATIONS):
             try:

@@ -1,4 +1,4 @@
-"""Splits: the fixed, versioned sets of drives of the benchmark, and how two of them are told to be equal.
+"""Splits: the fixed, versioned sets of drives of the benchmark, and how two of them are found to be equal.
 
 ``standard`` has the standard maneuvers, ``recorded`` every recorded drive of the package, and ``held-out``
 random drives whose seeds, cars and drivers no training or tuning draws.
@@ -91,7 +91,7 @@ class Split:
 
 
 def fingerprint(drive: CueTrace) -> Fingerprint:
-    """What tells a drive from another, coarsely enough to be compared between machines."""
+    """What distinguishes a drive from another, coarsely enough to be compared between machines."""
     force = drive.specific_force - drive.specific_force.mean(axis=0)
     motion = np.hstack([force, drive.angular_velocity])
     return (float(len(drive)), *np.sqrt(np.mean(motion**2, axis=0)).tolist())

@@ -75,7 +75,7 @@ class Driver:
         lane_wander: Standard deviation of the line aimed at from the path, m.
         wander_time: Correlation time of that line and of errors in speed, s.
         steering_noise: Standard deviation of the error of the steering-wheel angle, rad.
-        pedal_noise: Standard deviation of the error of the acceleration asked for, m/s^2.
+        pedal_noise: Standard deviation of the error of the requested acceleration, m/s^2.
         catch_up: Largest acceleration added to the planned one to make up for an error, m/s^2; 0 for no
             bound.
         patience: How far the plan may get ahead of the car before it waits for it, m; 0 for a plan that
@@ -173,7 +173,7 @@ class SpeedTarget:
     position: real  # along the path, m
     acceleration: real  # anticipated, m/s^2
     acceleration_now: real  # m/s^2
-    error: real  # of the acceleration asked for, by chance, m/s^2
+    error: real  # of the requested acceleration, by chance, m/s^2
 
 
 @wp.func
@@ -359,7 +359,7 @@ def target_at(schedule: wp.array(dtype=ScheduleRow), task: Task, sample: int, le
 
 @wp.func
 def pedals(car: CarParameters, force: real, speed: real, drag: real) -> vec2:
-    """Drive and brake force asked for, N, within what the car has; the engine's drag brakes first."""
+    """Requested drive and brake force, N, within what the car has; the engine's drag brakes first."""
     return vec2(
         wp.clamp(force, real(0.0) - drag, most_drive(car, speed)),
         wp.clamp(-force - drag, real(0.0), car.max_brake_force),
@@ -431,7 +431,7 @@ def decide(
     slope: Slope,
     drag: real,
 ) -> Commands:
-    """What the driver asks for, held for one integration step; ``drag`` is the engine's, N."""
+    """What the driver requests, held for one integration step; ``drag`` is the engine's, N."""
     command = Commands()
     force = force_command(car, driver, state[FORWARD], station, target, slope.grade)
     forces = pedals(car, force, state[FORWARD], drag)

@@ -16,7 +16,7 @@ from .rosbag import ROSBAG
 from .vbo import VBO
 
 FORMATS: Final[tuple[Reader, ...]] = (MDF, MCAP, ROSBAG, PHONE, VBO, DELIMITED)
-"""Readers in the order in which they are asked; text tables are what is left."""
+"""Readers in the order in which they are tried; text tables are what is left."""
 
 _HEAD: Final = 4096
 """Bytes at the beginning of a file that show its format."""

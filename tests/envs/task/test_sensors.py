@@ -1,4 +1,4 @@
-"""Sensors of the car's cues: each error as large as asked, the same in any batch, and none by default."""
+"""Sensors of the cues: each error as large as its option says, the same in any batch, none by default."""
 
 import numpy as np
 import pytest
