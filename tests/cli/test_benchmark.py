@@ -48,13 +48,13 @@ def test_training_seeds_are_one_policy(tmp_path):
 def test_it_writes_goes_on_and_compares(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words = ["benchmark", "--policies", "no-motion", "classical-tuned"]
-    assert main([*words, "--out", "a", "--markdown", "docs/page.md"]) == 0
+    assert main([*words, "--out", "a", "--markdown", "pages/page.md"]) == 0
     assert "4 drives driven now" in capsys.readouterr().out
     result = json.loads((tmp_path / "a" / "benchmark.json").read_text())
     assert result["splits"][0]["hash"] == small_split().hash
-    page = (tmp_path / "docs" / "page.md").read_text()
-    assert "motion-cueing benchmark --policies no-motion classical-tuned --markdown docs/page.md" in page
-    assert (tmp_path / "docs" / "page-intervals-paper.png").exists()
+    page = (tmp_path / "pages" / "page.md").read_text()
+    assert "motion-cueing benchmark --policies no-motion classical-tuned --markdown pages/page.md" in page
+    assert (tmp_path / "pages" / "page-intervals-paper.png").exists()
     assert main([*words, "learned", "--out", "a"]) == 0
     assert "2 drives driven now" in capsys.readouterr().out
     assert main([*words, "--out", "a", "--fresh"]) == 0
