@@ -173,7 +173,7 @@ def check_gravity(evidence: Evidence, options: ImportOptions) -> None:
 
 _PART_S: Final = 15.0
 _LARGEST_TILT: Final = math.radians(40.0)
-"""Parts of a drive, s, whose mean force may differ in direction by so much."""
+"""Parts of a drive, s, whose mean force may differ in direction by so much, beside what the motion explains."""
 
 
 def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
@@ -197,12 +197,24 @@ def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
                 "of the force changes; leave one part out with start_s or end_s, or set slopes='accept'"
             )
         cosine = means[place] @ means[place - 1] / (sizes[place] * sizes[place - 1])
-        if cosine < math.cos(_LARGEST_TILT):
+        tilt = math.acos(min(max(float(cosine), -1.0), 1.0))
+        if tilt > _LARGEST_TILT + sum(
+            _tilt_of_motion(evidence, part) for part in parts[place - 1 : place + 1]
+        ):
             raise DataError(
-                f"the vertical tilts by {math.degrees(math.acos(cosine)):.0f} deg in the device's axes "
+                f"the vertical tilts by {math.degrees(tilt):.0f} deg in the device's axes "
                 f"{when}: the device moved, or its axes change; leave one part out with start_s or end_s, or "
                 "set slopes='accept'"
             )
+
+
+def _tilt_of_motion(evidence: Evidence, part: slice) -> float:
+    """Angle between gravity and the mean force of a part, rad, by its changes of speed and its turns."""
+    if evidence.speed is None:
+        return 0.0
+    speed = evidence.speed[part]
+    turning = np.linalg.norm(np.mean(speed[:, None] * evidence.rate[part], axis=0))
+    return math.atan((abs(speed[-1] - speed[0]) / _PART_S + float(turning)) / GRAVITY)
 
 
 def check_fastest(evidence: Evidence, units: Mapping[str, str]) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
-import signal
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -16,6 +14,7 @@ from typing import Any, Final
 from ...envs.cues import CueTrace
 from ...envs.errors import DataError, MotionCueingError
 from ...envs.platform import Platform
+from ...envs.progress import begin_worker
 from ...envs.settings import configuration, to_dict
 from ...envs.storage import write_text
 from ..metrics import METRICS, measure
@@ -265,7 +264,7 @@ class BenchmarkRun:
         left = iter(todo)
         running: dict[Future[list[KeptDrive | str]], _Batch] = {}
         context = multiprocessing.get_context("spawn")
-        pool = ProcessPoolExecutor(self._request.workers, context, _begin_worker)
+        pool = ProcessPoolExecutor(self._request.workers, context, begin_worker)
         try:
             while True:
                 while len(running) < self._request.workers and not stopped():
@@ -300,21 +299,6 @@ class BenchmarkRun:
             result.notes[split.name] = {name: kept.notes for name, kept in done.items() if kept.notes}
             result.failures[split.name] = run.failures.get(split.name, {})
         return result
-
-
-def _begin_worker() -> None:
-    """In a worker: Ctrl-C is for the first process alone, and nothing outlives it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        import os
-
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def drive_batch(source: Any, platform: Platform, drives: Sequence[CueTrace]) -> list[KeptDrive | str]:

@@ -12,11 +12,9 @@ import os
 import pickle
 import secrets
 import shutil
-import signal
 import socket
 import sys
 import tempfile
-import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Sequence
@@ -31,7 +29,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from typing_extensions import Self
 
 from ...envs.errors import ConfigurationError, DataError, UnknownNameError
-from ...envs.progress import Interrupt
+from ...envs.progress import Interrupt, begin_worker
 
 if TYPE_CHECKING:
     from ..config import TrainingConfig
@@ -236,19 +234,6 @@ class _Workers(Engine, ABC):
                     listener.ended(job, ending)
 
 
-def _begin_process() -> None:
-    """In a worker: Ctrl-C is for the first process alone, and nothing outlives it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 class _Manager(BaseManager):
     """The process of a mailbox."""
 
@@ -268,7 +253,7 @@ class ProcessEngine(_Workers):
     def __enter__(self) -> Self:
         """Begin; workers start when there is work for them."""
         self._manager = _Manager(ctx=self._context)
-        self._manager.start(_begin_process)
+        self._manager.start(begin_worker)
         self._mailbox: Any = self._manager.Mailbox()  # type: ignore[attr-defined]
         return self
 
@@ -290,7 +275,7 @@ class ProcessEngine(_Workers):
 
     def _submit(self, job: Job) -> Future[Ending]:
         idle = (pool for pool, last in self._pools.items() if last.done() and last.exception() is None)
-        pool = next(idle, None) or ProcessPoolExecutor(1, self._context, _begin_process)
+        pool = next(idle, None) or ProcessPoolExecutor(1, self._context, begin_worker)
         try:
             self._pools[pool] = pool.submit(_perform, job, self._mailbox.tell)
         except BrokenExecutor as error:

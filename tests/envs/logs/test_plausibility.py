@@ -61,8 +61,8 @@ def test_slow_rates_in_degrees_are_found_by_their_slope(tmp_path: Path) -> None:
         "wx": 0.1 * table["wx"],
         "wy": 0.1 * table["wy"],
     }
-    # So that the force of the turns can be judged, the car is twice as fast.
-    table |= {"v": 2.0 * table["v"], "ax": 2.0 * table["ax"], "ay": 2.0 * table["ay"]}
+    # So that the force of the turns can be judged, the car is four times as fast.
+    table |= {"v": 4.0 * table["v"], "ax": 4.0 * table["ax"], "ay": 4.0 * table["ay"]}
     wrong = scaled(table, RATES, np.degrees(1.0))
     with pytest.raises(DataError, match=r"the rates are off by a factor of 57.*deg/s"):
         imported(tmp_path, wrong, COLUMNS)
