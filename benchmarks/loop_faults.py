@@ -1,4 +1,4 @@
-"""Faults of a sender, and what is felt in the cab, for every policy that can be served. No network, no clock.
+"""Faults of a sender, and the cab's motion, for every policy that can be served. No network, no clock.
 
 `python -m benchmarks.loop_faults` prints a table of jerks; docs/results/real-time.md has what it found.
 """

@@ -173,7 +173,7 @@ def check_gravity(evidence: Evidence, options: ImportOptions) -> None:
 
 _PART_S: Final = 15.0
 _LARGEST_TILT: Final = math.radians(40.0)
-"""Parts of a drive, s, whose mean force may differ in direction by so much, beside what the motion explains."""
+"""Parts of a drive, s, whose mean force may differ in direction by so much, rad, and what motion explains."""
 
 
 def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
@@ -198,9 +198,8 @@ def check_constancy(evidence: Evidence, options: ImportOptions) -> None:
             )
         cosine = means[place] @ means[place - 1] / (sizes[place] * sizes[place - 1])
         tilt = math.acos(min(max(float(cosine), -1.0), 1.0))
-        if tilt > _LARGEST_TILT + sum(
-            _tilt_of_motion(evidence, part) for part in parts[place - 1 : place + 1]
-        ):
+        explained = sum(_tilt_of_motion(evidence, part) for part in parts[place - 1 : place + 1])
+        if tilt > _LARGEST_TILT + explained:
             raise DataError(
                 f"the vertical tilts by {math.degrees(tilt):.0f} deg in the device's axes "
                 f"{when}: the device moved, or its axes change; leave one part out with start_s or end_s, or "

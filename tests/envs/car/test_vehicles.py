@@ -84,7 +84,7 @@ def test_steering_angle_and_yaw_gain_agree(name, speed, acceleration):
 
 
 SEATS = {"van": (0.0, 1.3), "truck": (1.4, 2.3), "city-bus": (2.7, 1.6)}
-"""How far before the front axle and how high above the road a driver sits at most, m, where not as in a car."""
+"""Most a driver sits before the front axle and above the c.g., m, where not as in a car."""
 
 
 @pytest.mark.parametrize("name", car_names())
