@@ -186,7 +186,7 @@ _TILT_RATE: Final = (math.radians(0.5), math.radians(20.0))
 """Up to four times the largest limit in use (doi 10.1177/0037549716675955): J, not a rule, decides."""
 _TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(200.0))
 _APPROACH: Final = (0.5, 50.0)
-_SPLIT: Final = (0.1, 200.0)
+_SPLIT: Final = (0.1, 100.0)
 TRAVEL: Final = (0.3, 30.0)
 """m; up to where the carriage's ends no longer count."""
 CARRIAGE_SPEED: Final = (0.3, 30.0)

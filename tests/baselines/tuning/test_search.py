@@ -64,6 +64,16 @@ def test_a_place_is_a_parameter_set_and_back(place):
         np.testing.assert_allclose(value, (coordinate.low, coordinate.high), rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_end_of_every_range_is_a_washout(name):
+    space = WashoutSpace(load_washout(FAMILIES[name].start))
+    for index in range(len(space)):
+        for end in (0.0, 1.0):
+            places = np.full(len(space), 0.5)
+            places[index] = end
+            assert space.encode(space.decode(places)) == pytest.approx(places)
+
+
 @pytest.mark.parametrize("name", washout_presets())
 def test_what_a_search_may_not_change_stays(name):
     start = load_washout(name)
