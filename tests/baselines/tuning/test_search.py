@@ -25,6 +25,7 @@ from motion_cueing.baselines.washout import (
     load_washout,
     washout_presets,
 )
+from motion_cueing.baselines.washout.families import load_of
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.envs.platform import get_platform
@@ -66,7 +67,7 @@ def test_a_place_is_a_parameter_set_and_back(place):
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_every_end_of_every_range_is_a_washout(name):
-    space = WashoutSpace(load_washout(FAMILIES[name].start))
+    space = WashoutSpace(load_of(name, FAMILIES[name].start))
     for index in range(len(space)):
         for end in (0.0, 1.0):
             places = np.full(len(space), 0.5)
