@@ -65,7 +65,7 @@ def test_a_place_is_a_parameter_set_and_back(place):
         np.testing.assert_allclose(value, (coordinate.low, coordinate.high), rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", sorted(FAMILIES))
 def test_every_end_of_every_range_is_a_washout(name):
     space = WashoutSpace(load_of(name, FAMILIES[name].start))
     for index in range(len(space)):
