@@ -1,4 +1,4 @@
-"""Search for the weights and forecasts of predictive control, on the random drives that agents are trained on.
+"""Search for weights and forecasts of predictive control, on the random drives that agents are trained on.
 
     python -m benchmarks.mpc_weights --start mpc --out mpc-tuned.yaml
     python -m benchmarks.mpc_weights --start mpc-preview --hours 20 --out mpc-preview-tuned.yaml
