@@ -192,7 +192,7 @@ def _no_motion(platform: Platform) -> Policy:
 def _washout(name: str, platform: Platform) -> Policy:
     from .washout import load_parameters, make_washout
 
-    return make_washout(load_parameters(name), platform.cab)
+    return make_washout(load_parameters(name, platform.name), platform.cab)
 
 
 def _mpc(name: str, platform: Platform) -> Policy:
