@@ -49,8 +49,6 @@ def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
         return None
     for name in ("platform", "observation", "action"):
         theirs, ours = getattr(agent.task, name), getattr(config.task, name)
-        if name == "observation":  # Means of the road ahead stand in the rows of its samples.
-            theirs = replace(theirs, preview_mean=ours.preview_mean)
         if theirs != ours:
             raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {ours}")
     return agent.network

@@ -51,8 +51,6 @@ class ObservationOptions:
     Args:
         preview: Samples of the car's cues ahead.
         preview_spacing: Time between them, s; rounded to whole time steps.
-        preview_mean: Whether each is the mean since the one before, not the cue at its time. A mean misses no
-            shift of gears between two samples, and a rough road is no noise in it.
         perceived: Whether the signals the driver senses, in the car and in the simulator, are added.
         true_motion: Whether the machine's true motion is added; it differs from the set-points where
             actuators lag.
@@ -72,7 +70,6 @@ class ObservationOptions:
 
     preview: Annotated[int, Field(ge=0)] = 0
     preview_spacing: Positive = 0.2
-    preview_mean: bool = False
     perceived: bool = False
     true_motion: bool = False
     stack: Annotated[int, Field(ge=1)] = 1
@@ -200,8 +197,7 @@ ADDED: Final = (
             1.0,
             "10 m/s^2, rad/s",
             "`observation.preview`: car's cues ahead, nearest first, as `reference_force` and "
-            "`reference_rate`; the last cue after the end. With `observation.preview_mean` means over the "
-            "time from one to the next",
+            "`reference_rate`; the last cue after the end",
             entries="6 each",
             typical=_TYPICAL_CUE,
         ),
@@ -476,7 +472,6 @@ class View:
     first: Firsts
     preview_samples: int
     preview_stride: int  # time steps between samples
-    preview_width: int  # of them in a mean, 1 for single cues
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
     modeled: int  # whether the cab's cues are those of the set-points
     force_noise: real  # m/s^2
@@ -505,7 +500,6 @@ def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[fl
         setattr(view.first, added.row.name, layout.first(added.row.name))
     view.preview_samples = seen.preview
     view.preview_stride = max(1, round(seen.preview_spacing / dt))
-    view.preview_width = view.preview_stride if seen.preview_mean else 1
     view.cab_frame, view.modeled = int(seen.frame == "cab"), int(seen.simulator_cue == "model")
     view.force_noise, view.rate_noise = noise
     return view
@@ -578,20 +572,14 @@ def put_measured(
 def put_preview(
     v: View, drives: Drives, drive: int, sample: int, bounds: pair_array, out: float_rows, i: int
 ) -> int:
-    """Write the true cues of the car ahead, or their means, the last one of the drive after its end."""
+    """Write the true cues of the car ahead, the last one of the drive after its end."""
     first = drives.first[drive]
     last = drives.length[drive] - 1
     for j in range(v.preview_samples):
-        force = vec3(real(0.0))
-        rate = vec3(real(0.0))
-        for back in range(v.preview_width):
-            ahead = first + wp.min(sample + (j + 1) * v.preview_stride - back, last)
-            force += lifted(drives.force[ahead])
-            rate += drives.rate[ahead]
-        share = real(1.0) / real(v.preview_width)
+        ahead = first + wp.min(sample + (j + 1) * v.preview_stride, last)
         k = v.first.preview + 6 * j
-        put_vector(out, i, k, share * force, 3, wp.static(UNIT["reference_force"]), bounds)
-        put_vector(out, i, k + 3, share * rate, 3, wp.static(UNIT["reference_rate"]), bounds)
+        put_vector(out, i, k, lifted(drives.force[ahead]), 3, wp.static(UNIT["reference_force"]), bounds)
+        put_vector(out, i, k + 3, drives.rate[ahead], 3, wp.static(UNIT["reference_rate"]), bounds)
     return 0
 
 

@@ -25,7 +25,6 @@ SHORT = EpisodeOptions(library=3, drive_duration=2.0, duration=0.4, random_start
 EVERY_OPTION: dict[str, dict[str, Any]] = {
     "defaults": {},
     "preview": {"observation": ObservationOptions(preview=5, preview_spacing=0.1)},
-    "preview means": {"observation": ObservationOptions(preview=5, preview_spacing=0.1, preview_mean=True)},
     "perceived": {"observation": ObservationOptions(perceived=True)},
     "true motion": {"observation": ObservationOptions(true_motion=True)},
     "told machine": {"observation": ObservationOptions(machine=True)},

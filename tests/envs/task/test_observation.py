@@ -87,17 +87,6 @@ def test_preview_is_the_drive_ahead_and_its_last_cue_after_its_end(steps):
     assert close(seen[:, 3:], cues.angular_velocity[ahead])
 
 
-@pytest.mark.parametrize("steps", [0, 280])
-def test_preview_may_be_the_mean_from_each_sample_to_the_next(steps):
-    options = ObservationOptions(preview=4, preview_spacing=0.25, preview_mean=True)
-    env, observation = moved(steps, observation=options)
-    cues, ahead = drive(), np.minimum(steps + np.arange(1, 101), 300)
-    seen = row(env, observation, "preview").reshape(4, 6)
-    force, rate = cues.specific_force[ahead], cues.angular_velocity[ahead]
-    assert close(10.0 * seen[:, :3], force.reshape(4, 25, 3).mean(axis=1) + GRAVITY)
-    assert close(seen[:, 3:], rate.reshape(4, 25, 3).mean(axis=1))
-
-
 def test_perceived_rows_are_what_is_sensed():
     env, observation = moved(observation=ObservationOptions(perceived=True))
     state = env.batch.simulator.state[0]
