@@ -16,6 +16,19 @@ The set is invariant: from every safe state a speed v' exists with |v' - v| <= A
 state again. So position, speed and acceleration limits hold together and forever, and no end of travel is
 met with a bump. Solving the condition of the next state for v' gives the bound of :func:`braking_speed`.
 
+**Braking without a kick.** Where the machine bounds the jerk J of braking, the state (q, v) after a step is safe
+at an upper end only if the actuator can stop there while its acceleration changes by at most J dt a step.
+From the acceleration a of the step, braking goes to a peak, holds -A where that is reached, and ends with
+speed and acceleration 0 together. It takes
+
+    D = (w a - a^3 / 6 + g) / J^2,   w = J v + a^2 / 2,   g = w^(3/2) up to w = A^2, then (A w + w^2 / A) / 2,
+
+and D <= q_max - A dt^2 / 8 - q is required. As a is constant within a step, it counts as J dt / 2 more than it
+is. This set is invariant, too: from each of its states a next one is reached by lowering a by no more than
+J dt. A speed limit V is approached likewise, with v + a^2 / (2 J) <= V. A command that leads to a safe state is
+followed to the last bit, whatever its jerk; else the nearest safe acceleration is taken. The limits of the
+paragraph above hold beside this.
+
 **Actuators.** A second-order lag and a dead time for each subsystem; none by default, as in the paper. The
 lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere negative:
 position, speed and acceleration of the machine are weighted means of those of the set-point, and keep every
@@ -71,6 +84,115 @@ def rate_bounds(
 
 
 @wp.func
+def stopping_distance(speed: real, acceleration: real, greatest: real, jerk: real) -> real:
+    """Way to standstill with bounded jerk; 0 where the actuator moves away from the end and stays so.
+
+    Args:
+        speed: Towards the end.
+        acceleration: Towards it, now.
+        greatest: Acceleration limit.
+        jerk: Greatest change of acceleration over time.
+    """
+    w = jerk * speed + real(0.5) * acceleration * acceleration
+    if acceleration < real(0.0) and w < acceleration * acceleration:
+        # It brakes harder than it need: the speed is gone before the acceleration has returned to 0.
+        if speed <= real(0.0):
+            return real(0.0)
+        left = wp.sqrt(real(2.0) * (acceleration * acceleration - w))
+        gone = -acceleration - left
+        return gone * gone * (real(2.0) * left - acceleration) / (real(6.0) * jerk * jerk)
+    if w <= real(0.0):
+        return real(0.0)
+    braking = w * wp.sqrt(w)
+    if w > greatest * greatest:
+        braking = real(0.5) * (greatest * w + w * w / greatest)
+    cubic = acceleration * acceleration * acceleration / real(6.0)
+    return (w * acceleration - cubic + braking) / (jerk * jerk)
+
+
+@wp.func
+def stopping_slopes(speed: real, acceleration: real, greatest: real, jerk: real) -> vec2:
+    """Derivatives of :func:`stopping_distance` by speed and by acceleration."""
+    w = jerk * speed + real(0.5) * acceleration * acceleration
+    if acceleration < real(0.0) and w < acceleration * acceleration:
+        if speed <= real(0.0):
+            return vec2(real(0.0), real(0.0))
+        gone = -acceleration - wp.sqrt(real(2.0) * (acceleration * acceleration - w))
+        return vec2(gone / jerk, real(0.5) * gone * gone / (jerk * jerk))
+    if w <= real(0.0):
+        return vec2(real(0.0), real(0.0))
+    slope = acceleration + real(1.5) * wp.sqrt(w)
+    if w > greatest * greatest:
+        slope = acceleration + real(0.5) * greatest + w / greatest
+    return vec2(slope / jerk, (jerk * speed + slope * acceleration) / (jerk * jerk))
+
+
+@wp.func
+def stops_in_time(room: real, speed: real, acceleration: real, greatest: real, jerk: real, dt: real) -> bool:
+    """Whether an actuator still stops within ``room`` after a step with this acceleration."""
+    after = speed + acceleration * dt
+    left = room - real(0.5) * (speed + after) * dt
+    eased = acceleration + real(0.5) * jerk * dt
+    return left >= real(0.0) and stopping_distance(after, eased, greatest, jerk) <= left
+
+
+BISECTIONS = wp.constant(45 if real is wp.float64 else 22)
+"""Halvings of the acceleration that just stops in time: to the precision of a number."""
+
+
+@wp.func
+def eased_acceleration(room: real, speed: real, greatest: real, jerk: real, dt: real) -> real:
+    """Greatest acceleration towards an end of travel from which :func:`stops_in_time` holds.
+
+    Where none does, the one that brings the actuator to rest, as far as its limit allows.
+    """
+    least = wp.max(-greatest, -wp.max(speed, real(0.0)) / dt - real(0.5) * jerk * dt)
+    most = greatest
+    for _ in range(BISECTIONS):
+        middle = real(0.5) * (least + most)
+        if stops_in_time(room, speed, middle, greatest, jerk, dt):
+            least = middle
+        else:
+            most = middle
+    return least
+
+
+@wp.func_grad(eased_acceleration)
+def adjoint_eased_acceleration(
+    room: real, speed: real, greatest: real, jerk: real, dt: real, adjoint: real
+) -> None:
+    """Implicit function theorem: the stopping distance after the step equals the room that is left."""
+    acceleration = eased_acceleration(room, speed, greatest, jerk, dt)
+    slopes = stopping_slopes(speed + acceleration * dt, acceleration + real(0.5) * jerk * dt, greatest, jerk)
+    by_acceleration = slopes[0] * dt + slopes[1] + real(0.5) * dt * dt
+    wp.adjoint[room] += adjoint / by_acceleration
+    wp.adjoint[speed] += -adjoint * (slopes[0] + dt) / by_acceleration
+
+
+@wp.func
+def eased_speed(speed: real, velocity: real, acceleration: real, jerk: real, dt: real) -> real:
+    """Greatest speed after a step from which the speed limit is approached with bounded jerk."""
+    step = jerk * dt
+    most = wp.sqrt(step * step + real(2.0) * jerk * wp.max(velocity - speed, real(0.0))) - step
+    return speed + wp.min(most, acceleration) * dt
+
+
+@wp.func
+def eased_rate(
+    distance: real, speed: real, requested: real, velocity: real, acceleration: real, jerk: real, dt: real
+) -> real:
+    """The speed requested towards an end of travel, or the greatest that brakes with bounded jerk."""
+    rate = wp.min(requested, eased_speed(speed, velocity, acceleration, jerk, dt))
+    room = distance - real(0.125) * acceleration * dt * dt
+    # At rest within the last tenth of a millimeter: no motion is needed to stop.
+    if room < real(0.0) and speed <= real(0.0):
+        return rate
+    if not stops_in_time(room, speed, (rate - speed) / dt, acceleration, jerk, dt):
+        rate = speed + eased_acceleration(room, speed, acceleration, jerk, dt) * dt
+    return rate
+
+
+@wp.func
 def is_safe(q: real, v: real, q_min: real, q_max: real, acceleration: real, dt: real) -> bool:
     """Whether (q, v) lies in the safe set of both ends."""
     distance = q_max - q
@@ -80,28 +202,6 @@ def is_safe(q: real, v: real, q_min: real, q_max: real, acceleration: real, dt: 
     if v != real(0.0):
         needed = real(0.5) * v * v / acceleration + real(0.125) * acceleration * dt * dt
     return distance >= needed and q >= q_min and q <= q_max
-
-
-@wp.func
-def active_limit(
-    requested: real, q: real, v: real, q_min: real, q_max: real, velocity: real, acceleration: real, dt: real
-) -> int:
-    """Which limit holds back a requested speed: 0 none, 1 end of travel, 2 velocity, 4 acceleration."""
-    bounds = rate_bounds(q, v, q_min, q_max, velocity, acceleration, dt)
-    if requested >= bounds[0] and requested <= bounds[1]:
-        return 0
-    ahead = q_max - q
-    towards = v
-    bound = bounds[1]
-    if requested < bounds[0]:
-        ahead = q - q_min
-        towards = -v
-        bound = -bounds[0]
-    if braking_speed(ahead, towards, acceleration, dt) <= wp.min(velocity, bound):
-        return 1
-    if bound >= velocity:
-        return 2
-    return 4
 
 
 CARRIAGE = slice(0, 2)
@@ -135,6 +235,7 @@ class Machine:
     position_max: vec9
     velocity: vec9  # m/s, rad/s
     acceleration: vec9  # m/s^2, rad/s^2
+    jerk: vec9  # with which limits brake, m/s^3, rad/s^3; 0 for any
     cab: vec3  # D_o: reference point of the cab from the turntable's axis, turntable at 0
     head: vec3  # D_o + OP_SS: the driver's head
     lag: mat65  # transition of the three actuator dynamics, see actuators.py
@@ -318,15 +419,15 @@ def keeps_clear(
 
 @wp.struct
 class Bounds:
-    """Least and greatest speed of every actuator after a step, by :func:`~.limiter.rate_bounds`."""
+    """Least and greatest speed of every actuator after a step."""
 
     lower: vec9
     upper: vec9
 
 
 @wp.func
-def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
-    """The bounds of all actuators."""
+def hard_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
+    """The bounds of all actuators, whatever the jerk."""
     lower = vec9()
     upper = vec9()
     for i in range(9):
@@ -343,16 +444,62 @@ def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
 
 
 @wp.func
+def all_bounds(m: Machine, start: Motion, requested: vec9, dt: real) -> Bounds:
+    """The bounds of all actuators: where a requested rate needs it, those that brake with bounded jerk."""
+    hard = hard_bounds(m, start, dt)
+    lower = vec9()
+    upper = vec9()
+    for i in range(9):
+        least = hard.lower[i]
+        most = hard.upper[i]
+        if m.jerk[i] > real(0.0):
+            q = start.position[i]
+            v = start.rate[i]
+            up = eased_rate(
+                m.position_max[i] - q, v, requested[i], m.velocity[i], m.acceleration[i], m.jerk[i], dt
+            )
+            down = -eased_rate(
+                q - m.position_min[i], -v, -requested[i], m.velocity[i], m.acceleration[i], m.jerk[i], dt
+            )
+            if up < requested[i]:
+                most = wp.clamp(up, hard.lower[i], hard.upper[i])
+            if down > requested[i]:
+                least = wp.clamp(down, hard.lower[i], hard.upper[i])
+        lower[i] = least
+        upper[i] = most
+    bounds = Bounds()
+    bounds.lower = lower
+    bounds.upper = upper
+    return bounds
+
+
+@wp.func
 def limit_flag(m: Machine, start: Motion, bounds: Bounds, i: int, requested: real, dt: real) -> wp.uint64:
-    """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask; none for a missing one."""
+    """The limit that actuator ``i`` meets, as its four bits of :class:`Step`'s mask.
+
+    1 end of travel, 2 velocity, 4 acceleration; 0 for none, and for a missing actuator.
+    """
     if (requested >= bounds.lower[i] and requested <= bounds.upper[i]) or m.position_max[i] <= m.position_min[
         i
     ]:
         return wp.uint64(0)
-    code = active_limit(
-        requested, start.position[i], start.rate[i], m.position_min[i], m.position_max[i],
-        m.velocity[i], m.acceleration[i], dt,
-    )  # fmt: skip
+    ahead = m.position_max[i] - start.position[i]
+    towards = start.rate[i]
+    bound = bounds.upper[i]
+    if requested < bounds.lower[i]:
+        ahead = start.position[i] - m.position_min[i]
+        towards = -towards
+        bound = -bounds.lower[i]
+    code = 4
+    if bound >= m.velocity[i]:
+        code = 2
+    if m.jerk[i] > real(0.0) and bound < towards + m.acceleration[i] * dt:
+        # Braking for the speed limit gives this bound, braking for the end a lower one.
+        code = 2
+        if bound < eased_speed(towards, m.velocity[i], m.acceleration[i], m.jerk[i], dt):
+            code = 1
+    if braking_speed(ahead, towards, m.acceleration[i], dt) <= wp.min(m.velocity[i], bound):
+        code = 1
     return wp.lshift(wp.uint64(code), wp.uint64(4 * i))
 
 
@@ -458,16 +605,17 @@ def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rate
     leg_speeds = legs_of(moved.motion.rate)
     if moved.limits == wp.uint64(0) and keeps_clear(m, start, jacobian, s, b, legs, leg_speeds, dt):
         return moved
-    return legs_towards(m, start, bounds, target, vec6(), dt)
+    # All the braking there is: the way to a singular pose was reckoned with it.
+    return legs_towards(m, start, hard_bounds(m, start, dt), target, vec6(), dt)
 
 
 @wp.func
-def limit_axes(start: Motion, bounds: Bounds, action: vec9, dt: real) -> Motion:
+def limit_axes(start: Motion, bounds: Bounds, requested: vec9, dt: real) -> Motion:
     """Carriage and turntable after the step, each within its own limits; the hexapod as it was."""
     half = real(0.5) * dt
-    x = limited_rate(bounds, 0, start.rate[0] + action[0] * dt)
-    y = limited_rate(bounds, 1, start.rate[1] + action[1] * dt)
-    t = limited_rate(bounds, 8, start.rate[8] + action[8] * dt)
+    x = limited_rate(bounds, 0, requested[0])
+    y = limited_rate(bounds, 1, requested[1])
+    t = limited_rate(bounds, 8, requested[8])
     after = start
     after.rate = joined(x, y, legs_of(start.rate), t)
     after.position = joined(
@@ -490,14 +638,17 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
     displacement = start.displacement + (start.velocity + velocity) * half
     beta = start.beta + (start.beta_rate + beta_rate) * half
 
-    bounds = all_bounds(m, start, dt)
-    after = limit_axes(start, bounds, action, dt)
     jacobian = leg_jacobian(m.geometry, displacement, beta)
     extensions = leg_extensions(m.geometry, displacement, beta)
     rates = leg_rates(jacobian, velocity, beta, beta_rate)
+    requested = joined(
+        start.rate[0] + action[0] * dt, start.rate[1] + action[1] * dt, rates, start.rate[8] + action[8] * dt
+    )
+    bounds = all_bounds(m, start, requested, dt)
+    after = limit_axes(start, bounds, requested, dt)
     clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates, dt)
     result = Step()
-    result.limits = command_limits(m, start, bounds, action, rates, clear, dt)
+    result.limits = command_limits(m, start, bounds, requested, clear, dt)
     if legs_may_follow(m, bounds, extensions, rates, dt) and clear:
         after = with_legs(after, extensions, rates)
         after.displacement = displacement
@@ -514,17 +665,14 @@ def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
 
 @wp.func
 def command_limits(
-    m: Machine, start: Motion, bounds: Bounds, action: vec9, requested_legs: vec6, clear: bool, dt: real
+    m: Machine, start: Motion, bounds: Bounds, requested: vec9, clear: bool, dt: real
 ) -> wp.uint64:
-    """Which limits a command meets, as :class:`Step`'s mask."""
+    """Which limits the requested rates meet, as :class:`Step`'s mask."""
     mask = wp.uint64(0)
     for i in range(9):
-        requested = start.rate[i] + action[i] * dt
-        if i >= 2 and i < 8:
-            requested = requested_legs[i - 2]
-            if not clear:
-                mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
-        mask = mask | limit_flag(m, start, bounds, i, requested, dt)
+        if i >= 2 and i < 8 and not clear:
+            mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
+        mask = mask | limit_flag(m, start, bounds, i, requested[i], dt)
     return mask
 
 
