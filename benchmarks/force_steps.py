@@ -83,9 +83,10 @@ def force_steps(driven: Trajectory, platform: Platform) -> ForceSteps:
     # Row 0 is the start: no action led to it, and the step to row 1 has no request before it.
     felt = np.linalg.norm(np.diff(driven.f_simulator, axis=0), axis=1)[1:]
     requested = np.linalg.norm(np.diff(requested_force(driven, platform), axis=0), axis=1)[1:]
-    # The flags of the step before count too: limits also let go.
+    # The step before counts too: limits also let go.
     flags = driven.limits_active[2:] | driven.limits_active[1:-1]
-    held = flags.any(axis=1)
+    away = np.abs(driven.action - driven.applied).max(axis=1) > 1e-6
+    held = flags.any(axis=1) | away[2:] | away[1:-1]
     excess = np.where(held, felt - requested, 0.0)
     worst = int(np.argmax(excess))
     metrics = measure(driven)
@@ -96,7 +97,7 @@ def force_steps(driven: Trajectory, platform: Platform) -> ForceSteps:
         float(max(excess[worst], 0.0)),
         float(driven.time[worst + 2]),
         ", ".join(_names(flags[worst])) if excess[worst] > 0.0 else "",
-        float(held.mean()),
+        float(driven.limits_active.any(axis=1).mean()),
         float(metrics.vibration or 0.0),
         metrics.cue_error,
     )

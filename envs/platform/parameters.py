@@ -100,6 +100,7 @@ def machine_parameters(platform: Platform, dt: float) -> Any:
     for name, values in limits_of(platform).items():
         setattr(machine, name, vec9(*values))
     machine.jerk = vec9(*braking_jerk(platform))
+    machine.felt_jerk = platform.braking.jerk or 0.0
     cab = np.array(platform.cab.reference_point)
     machine.cab = vec3(*cab)
     machine.head = vec3(*(cab + np.array(platform.cab.head)))

@@ -16,18 +16,20 @@ The set is invariant: from every safe state a speed v' exists with |v' - v| <= A
 state again. So position, speed and acceleration limits hold together and forever, and no end of travel is
 met with a bump. Solving the condition of the next state for v' gives the bound of :func:`braking_speed`.
 
-**Braking without a kick.** Where the machine bounds the jerk J of braking, the state (q, v) after a step is safe
-at an upper end only if the actuator can stop there while its acceleration changes by at most J dt a step.
-From the acceleration a of the step, braking goes to a peak, holds -A where that is reached, and ends with
-speed and acceleration 0 together. It takes
+**Braking without a kick.** Where the machine bounds the jerk J of braking, the state (q, v) after a step is
+safe at an upper end only if the actuator can stop there while its acceleration changes by at most J dt a
+step. From the acceleration a of the step, braking goes to a peak, holds -A where that is reached, and ends
+with speed and acceleration 0 together. It takes
 
-    D = (w a - a^3 / 6 + g) / J^2,   w = J v + a^2 / 2,   g = w^(3/2) up to w = A^2, then (A w + w^2 / A) / 2,
+    D = (w a - a^3 / 6 + g) / J^2,  w = J v + a^2 / 2,  g = w^(3/2) up to w = A^2, then (A w + w^2 / A) / 2,
 
-and D <= q_max - A dt^2 / 8 - q is required. As a is constant within a step, it counts as J dt / 2 more than it
-is. This set is invariant, too: from each of its states a next one is reached by lowering a by no more than
-J dt. A speed limit V is approached likewise, with v + a^2 / (2 J) <= V. A command that leads to a safe state is
-followed to the last bit, whatever its jerk; else the nearest safe acceleration is taken. The limits of the
-paragraph above hold beside this.
+and D <= q_max - A dt^2 / 8 - q is required. As a is constant within a step, it counts as J dt / 2 more than
+it is. This set is invariant, too: from each of its states a next one is reached by lowering a by no more
+than J dt. A speed limit V is approached likewise, with v + a^2 / (2 J) <= V. A command that leads to a safe
+state is followed to the last bit, whatever its jerk; else each actuator takes the nearest safe acceleration.
+From then until the command is met again, the felt force, too, goes towards it with bounded jerk, so that the
+free actuators do not jump where the held ones do not balance them. The limits of the paragraph above hold
+beside this.
 
 **Actuators.** A second-order lag and a dead time for each subsystem; none by default, as in the paper. The
 lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere negative:
@@ -56,6 +58,9 @@ from .geometry import (
     leg_jacobian,
     leg_rates,
     platform_rates,
+    rate_matrix,
+    rotation,
+    turntable_rotation,
 )
 
 
@@ -221,6 +226,9 @@ CLOSES = wp.constant(real(1e-10 if real is wp.float64 else 1e-5))
 HELD: Final = 1 << 36
 """Bit that says an emergency stop: the legs have no pose near the last one, which is held."""
 
+EASED: Final = 1 << 37
+"""Bit that says that the command is approached with bounded jerk, as a limit holds or has let go."""
+
 _EMERGENCY_STOP: Final = HELD | 0x088888800
 
 
@@ -236,6 +244,7 @@ class Machine:
     velocity: vec9  # m/s, rad/s
     acceleration: vec9  # m/s^2, rad/s^2
     jerk: vec9  # with which limits brake, m/s^3, rad/s^3; 0 for any
+    felt_jerk: real  # while a limit is active, m/s^3; 0 for any
     cab: vec3  # D_o: reference point of the cab from the turntable's axis, turntable at 0
     head: vec3  # D_o + OP_SS: the driver's head
     lag: mat65  # transition of the three actuator dynamics, see actuators.py
@@ -271,7 +280,7 @@ class Step:
     motion: Motion
     limits: (
         wp.uint64
-    )  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose; HELD
+    )  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose; HELD, EASED
 
 
 @wp.func
@@ -628,42 +637,6 @@ def limit_axes(start: Motion, bounds: Bounds, requested: vec9, dt: real) -> Moti
 
 
 @wp.func
-def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
-    """The set-point after a step with nine accelerations, within all limits."""
-    half = real(0.5) * dt
-    linear = vec3(action[2], action[3], action[4])
-    angular = vec3(action[5], action[6], action[7])
-    velocity = start.velocity + linear * dt
-    beta_rate = start.beta_rate + angular * dt
-    displacement = start.displacement + (start.velocity + velocity) * half
-    beta = start.beta + (start.beta_rate + beta_rate) * half
-
-    jacobian = leg_jacobian(m.geometry, displacement, beta)
-    extensions = leg_extensions(m.geometry, displacement, beta)
-    rates = leg_rates(jacobian, velocity, beta, beta_rate)
-    requested = joined(
-        start.rate[0] + action[0] * dt, start.rate[1] + action[1] * dt, rates, start.rate[8] + action[8] * dt
-    )
-    bounds = all_bounds(m, start, requested, dt)
-    after = limit_axes(start, bounds, requested, dt)
-    clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates, dt)
-    result = Step()
-    result.limits = command_limits(m, start, bounds, requested, clear, dt)
-    if legs_may_follow(m, bounds, extensions, rates, dt) and clear:
-        after = with_legs(after, extensions, rates)
-        after.displacement = displacement
-        after.velocity = velocity
-        after.beta = beta
-        after.beta_rate = beta_rate
-        result.motion = after
-    else:
-        limited = limited_legs(m, start, bounds, after, rates, dt)
-        result.motion = limited.motion
-        result.limits = result.limits | limited.limits
-    return result
-
-
-@wp.func
 def command_limits(
     m: Machine, start: Motion, bounds: Bounds, requested: vec9, clear: bool, dt: real
 ) -> wp.uint64:
@@ -676,6 +649,63 @@ def command_limits(
     return mask
 
 
+@wp.struct
+class Request:
+    """A command before limiting: the hexapod's motion after the step, and whether the machine may follow."""
+
+    displacement: vec3
+    velocity: vec3
+    beta: vec3
+    beta_rate: vec3
+    extensions: vec6
+    rates: vec9  # of all actuators
+    bounds: Bounds
+    clear: bool  # whether it leads to no singular pose
+    limits: wp.uint64  # that it meets
+
+
+@wp.func
+def request(m: Machine, start: Motion, action: vec9, dt: real) -> Request:
+    """What a command asks of the machine, and which limits it meets."""
+    half = real(0.5) * dt
+    r = Request()
+    r.velocity = start.velocity + vec3(action[2], action[3], action[4]) * dt
+    r.beta_rate = start.beta_rate + vec3(action[5], action[6], action[7]) * dt
+    r.displacement = start.displacement + (start.velocity + r.velocity) * half
+    r.beta = start.beta + (start.beta_rate + r.beta_rate) * half
+    jacobian = leg_jacobian(m.geometry, r.displacement, r.beta)
+    r.extensions = leg_extensions(m.geometry, r.displacement, r.beta)
+    legs = leg_rates(jacobian, r.velocity, r.beta, r.beta_rate)
+    r.rates = joined(
+        start.rate[0] + action[0] * dt, start.rate[1] + action[1] * dt, legs, start.rate[8] + action[8] * dt
+    )
+    r.bounds = all_bounds(m, start, r.rates, dt)
+    r.clear = keeps_clear(m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt)
+    r.limits = command_limits(m, start, r.bounds, r.rates, r.clear, dt)
+    return r
+
+
+@wp.func
+def follow(m: Machine, start: Motion, r: Request, dt: real) -> Step:
+    """The set-point after a step: the request where the machine may, else the nearest that keeps limits."""
+    after = limit_axes(start, r.bounds, r.rates, dt)
+    legs = legs_of(r.rates)
+    result = Step()
+    result.limits = r.limits
+    if legs_may_follow(m, r.bounds, r.extensions, legs, dt) and r.clear:
+        after = with_legs(after, r.extensions, legs)
+        after.displacement = r.displacement
+        after.velocity = r.velocity
+        after.beta = r.beta
+        after.beta_rate = r.beta_rate
+        result.motion = after
+    else:
+        limited = limited_legs(m, start, r.bounds, after, legs, dt)
+        result.motion = limited.motion
+        result.limits = r.limits | limited.limits
+    return result
+
+
 @wp.func
 def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
     """Accelerations of the nine degrees of freedom over a step, in the order of AXES."""
@@ -686,6 +716,49 @@ def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
         linear[0], linear[1], linear[2], angular[0], angular[1], angular[2],
         (after.rate[8] - before.rate[8]) / dt,
     )  # fmt: skip
+
+
+@wp.func
+def felt_change(m: Machine, motion: Motion, change: vec9) -> real:
+    """Change of the specific force in the cab, m/s^2, by a change of the nine accelerations.
+
+    It is taken at the cab's reference point or at the head, where it is larger.
+    """
+    to_inertial = rotation(motion.beta)
+    up = vec3(real(0.0), real(0.0), change[8])
+    angular = to_inertial * (rate_matrix(motion.beta) * vec3(change[5], change[6], change[7]) + up)
+    linear = vec3(change[0] + change[2], change[1] + change[3], change[4])
+    table = to_inertial * turntable_rotation(motion.position[8])
+    at_cab = linear + wp.cross(angular, table * m.cab)
+    at_head = linear + wp.cross(angular, table * m.head)
+    return wp.max(wp.length(at_cab), wp.length(at_head))
+
+
+@wp.func
+def command(m: Machine, start: Motion, acceleration: vec9, limits: wp.uint64, action: vec9, dt: real) -> Step:
+    """The set-point after a step with nine accelerations, within all limits.
+
+    Args:
+        m: The machine.
+        start: The set-point before the step.
+        acceleration: Of the set-point in the step before, in the order of AXES.
+        limits: Met in the step before.
+        action: The command.
+        dt: Time step, s.
+    """
+    direct = follow(m, start, request(m, start, action, dt), dt)
+    if m.felt_jerk <= real(0.0) or (limits | direct.limits) == wp.uint64(0):
+        return direct
+    # Limits hold an actuator, or let it go: the others must not jump either.
+    change = mean_acceleration(start, direct.motion, dt) - acceleration
+    felt = felt_change(m, start, change)
+    most = m.felt_jerk * dt
+    if felt <= most:
+        return direct
+    eased = acceleration + change * (most / felt)
+    result = follow(m, start, request(m, start, eased, dt), dt)
+    result.limits = result.limits | direct.limits | wp.uint64(wp.static(EASED))
+    return result
 
 
 @wp.func
