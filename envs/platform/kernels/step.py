@@ -116,6 +116,27 @@ def stopping_distance(speed: real, acceleration: real, greatest: real, jerk: rea
 
 
 @wp.func
+def resting_way(rate: real, acceleration: real, greatest: real, jerk: real) -> real:
+    """Way to rest with bounded jerk, with its sign: speed and acceleration end at 0 together."""
+    ahead = wp.sign(jerk * rate + real(0.5) * acceleration * wp.abs(acceleration))
+    return ahead * stopping_distance(ahead * rate, ahead * acceleration, greatest, jerk)
+
+
+@wp.func
+def resting_rate(rate: real, acceleration: real, greatest: real, jerk: real, dt: real) -> real:
+    """Rate after the next step of braking to rest with bounded jerk.
+
+    The acceleration p that returns to 0 in steps of J dt as the rate does has p^2 + p J dt = 2 J |rate|.
+    """
+    step = jerk * dt
+    speed = wp.abs(rate)
+    peak = real(0.5) * (wp.sqrt(step * step + real(8.0) * jerk * speed) - step)
+    peak = wp.min(wp.min(peak, speed / dt), greatest)
+    braking = wp.clamp(-wp.sign(rate) * peak, acceleration - step, acceleration + step)
+    return rate + wp.clamp(braking, -greatest, greatest) * dt
+
+
+@wp.func
 def stopping_slopes(speed: real, acceleration: real, greatest: real, jerk: real) -> vec2:
     """Derivatives of :func:`stopping_distance` by speed and by acceleration."""
     w = jerk * speed + real(0.5) * acceleration * acceleration
@@ -390,6 +411,22 @@ def brakes_clear(
 
 
 @wp.func
+def rests_clear(
+    m: Machine, displacement: vec3, beta: vec3, extensions: vec6, ways: vec6, least: real
+) -> bool:
+    """Whether the poses half-way and at the end of the legs' stopping ways are clear."""
+    half = real(0.5)
+    middle = forward_kinematics(m.geometry, extensions + half * ways, displacement, beta)
+    rest = forward_kinematics(
+        m.geometry,
+        extensions + ways,
+        vec3(middle[0], middle[1], middle[2]),
+        vec3(middle[3], middle[4], middle[5]),
+    )
+    return is_clear(m, middle, beta, least) and is_clear(m, rest, beta, least)
+
+
+@wp.func
 def keeps_clear(
     m: Machine,
     start: Motion,
@@ -413,17 +450,41 @@ def keeps_clear(
         return False
     if m.far_from_singular > real(1.0):
         return brakes_clear(m, start, displacement, beta, extensions, rates, least, dt)
-    halfway = extensions
-    resting = extensions
+    ways = vec6()
     for i in range(6):
-        way = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
-        halfway[i] = extensions[i] + real(0.5) * way
-        resting[i] = extensions[i] + way
-    middle = forward_kinematics(m.geometry, halfway, displacement, beta)
-    rest = forward_kinematics(
-        m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
-    )
-    return is_clear(m, middle, beta, least) and is_clear(m, rest, beta, least)
+        ways[i] = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
+    return rests_clear(m, displacement, beta, extensions, ways, least)
+
+
+CLEARER = wp.constant(real(wp.static(NEARLY_SINGULAR) + 0.05))
+"""Clearance below which the platform is not let come to rest by braking with bounded jerk."""
+
+
+@wp.func
+def eases_clear(
+    m: Machine,
+    start: Motion,
+    jacobian: Jacobian,
+    displacement: vec3,
+    beta: vec3,
+    extensions: vec6,
+    rates: vec6,
+    dt: real,
+) -> bool:
+    """:func:`keeps_clear` for a platform whose legs brake with bounded jerk, and with some clearance more."""
+    if m.felt_jerk <= real(0.0):
+        return True
+    now = determinant(jacobian) / m.neutral_determinant
+    if now >= m.far_from_singular:
+        return True
+    least = wp.min(CLEARER, clearance(m, start.displacement, start.beta))
+    if now < least:
+        return False
+    ways = vec6()
+    for i in range(6):
+        k = i + 2
+        ways[i] = resting_way(rates[i], (rates[i] - start.rate[k]) / dt, m.acceleration[k], m.jerk[k])
+    return rests_clear(m, displacement, beta, extensions, ways, least)
 
 
 @wp.struct
@@ -604,16 +665,46 @@ def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rate
 
 
 @wp.func
-def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Step:
+def braking_rates(m: Machine, start: Motion, acceleration: vec9, dt: real) -> vec6:
+    """Leg rates after a step of braking to rest with bounded jerk.
+
+    The legs' accelerations are those that continue the platform's ``acceleration``.
+    """
+    half = real(0.5) * dt
+    velocity = start.velocity + vec3(acceleration[2], acceleration[3], acceleration[4]) * dt
+    beta_rate = start.beta_rate + vec3(acceleration[5], acceleration[6], acceleration[7]) * dt
+    displacement = start.displacement + (start.velocity + velocity) * half
+    beta = start.beta + (start.beta_rate + beta_rate) * half
+    onward = leg_rates(leg_jacobian(m.geometry, displacement, beta), velocity, beta, beta_rate)
+    rates = vec6()
+    for i in range(6):
+        k = i + 2
+        now = start.rate[k]
+        rates[i] = resting_rate(now, (onward[i] - now) / dt, m.acceleration[k], m.jerk[k], dt)
+    return rates
+
+
+@wp.func
+def limited_legs(
+    m: Machine, start: Motion, acceleration: vec9, bounds: Bounds, target: Motion, rates: vec6, dt: real
+) -> Step:
     """Legs towards their requested rates, or braking to rest where that would lead into a singular pose."""
     moved = legs_towards(m, start, bounds, target, rates, dt)
     s = moved.motion.displacement
     b = moved.motion.beta
-    jacobian = leg_jacobian(m.geometry, s, b)
     legs = legs_of(moved.motion.position)
     leg_speeds = legs_of(moved.motion.rate)
+    jacobian = leg_jacobian(m.geometry, s, b)
     if moved.limits == wp.uint64(0) and keeps_clear(m, start, jacobian, s, b, legs, leg_speeds, dt):
-        return moved
+        if eases_clear(m, start, jacobian, s, b, legs, leg_speeds, dt):
+            return moved
+        eased = legs_towards(m, start, bounds, target, braking_rates(m, start, acceleration, dt), dt)
+        s_eased = eased.motion.displacement
+        b_eased = eased.motion.beta
+        j_eased = leg_jacobian(m.geometry, s_eased, b_eased)
+        l_eased = legs_of(eased.motion.position)
+        if keeps_clear(m, start, j_eased, s_eased, b_eased, l_eased, legs_of(eased.motion.rate), dt):
+            return eased
     # All the braking there is: the way to a singular pose was reckoned with it.
     return legs_towards(m, start, hard_bounds(m, start, dt), target, vec6(), dt)
 
@@ -680,14 +771,19 @@ def request(m: Machine, start: Motion, action: vec9, dt: real) -> Request:
         start.rate[0] + action[0] * dt, start.rate[1] + action[1] * dt, legs, start.rate[8] + action[8] * dt
     )
     r.bounds = all_bounds(m, start, r.rates, dt)
-    r.clear = keeps_clear(m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt)
+    r.clear = keeps_clear(m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt) and eases_clear(
+        m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt
+    )
     r.limits = command_limits(m, start, r.bounds, r.rates, r.clear, dt)
     return r
 
 
 @wp.func
-def follow(m: Machine, start: Motion, r: Request, dt: real) -> Step:
-    """The set-point after a step: the request where the machine may, else the nearest that keeps limits."""
+def follow(m: Machine, start: Motion, acceleration: vec9, r: Request, dt: real) -> Step:
+    """The set-point after a step: the request where the machine may, else the nearest that keeps limits.
+
+    ``acceleration`` is that of the nine axes in the step before.
+    """
     after = limit_axes(start, r.bounds, r.rates, dt)
     legs = legs_of(r.rates)
     result = Step()
@@ -700,7 +796,7 @@ def follow(m: Machine, start: Motion, r: Request, dt: real) -> Step:
         after.beta_rate = r.beta_rate
         result.motion = after
     else:
-        limited = limited_legs(m, start, r.bounds, after, legs, dt)
+        limited = limited_legs(m, start, acceleration, r.bounds, after, legs, dt)
         result.motion = limited.motion
         result.limits = r.limits | limited.limits
     return result
@@ -746,7 +842,7 @@ def command(m: Machine, start: Motion, acceleration: vec9, limits: wp.uint64, ac
         action: The command.
         dt: Time step, s.
     """
-    direct = follow(m, start, request(m, start, action, dt), dt)
+    direct = follow(m, start, acceleration, request(m, start, action, dt), dt)
     if m.felt_jerk <= real(0.0) or (limits | direct.limits) == wp.uint64(0):
         return direct
     # Limits hold an actuator, or let it go: the others must not jump either.
@@ -756,7 +852,7 @@ def command(m: Machine, start: Motion, acceleration: vec9, limits: wp.uint64, ac
     if felt <= most:
         return direct
     eased = acceleration + change * (most / felt)
-    result = follow(m, start, request(m, start, eased, dt), dt)
+    result = follow(m, start, acceleration, request(m, start, eased, dt), dt)
     result.limits = result.limits | direct.limits | wp.uint64(wp.static(EASED))
     return result
 
