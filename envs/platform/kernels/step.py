@@ -456,7 +456,7 @@ def keeps_clear(
     return rests_clear(m, displacement, beta, extensions, ways, least)
 
 
-CLEARER = wp.constant(real(wp.static(NEARLY_SINGULAR) + 0.05))
+CLEARER = wp.constant(real(wp.static(NEARLY_SINGULAR) + 0.1))
 """Clearance below which the platform is not let come to rest by braking with bounded jerk."""
 
 
