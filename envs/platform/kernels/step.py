@@ -208,14 +208,43 @@ def eased_rate(
     distance: real, speed: real, requested: real, velocity: real, acceleration: real, jerk: real, dt: real
 ) -> real:
     """The speed requested towards an end of travel, or the greatest that brakes with bounded jerk."""
-    rate = wp.min(requested, eased_speed(speed, velocity, acceleration, jerk, dt))
     room = distance - real(0.125) * acceleration * dt * dt
+    rate = wp.min(requested, eased_speed(speed, velocity, acceleration, jerk, dt))
     # At rest within the last tenth of a millimeter: no motion is needed to stop.
     if room < real(0.0) and speed <= real(0.0):
         return rate
     if not stops_in_time(room, speed, (rate - speed) / dt, acceleration, jerk, dt):
         rate = speed + eased_acceleration(room, speed, acceleration, jerk, dt) * dt
     return rate
+
+
+@wp.func
+def has_room(
+    q: real,
+    v: real,
+    requested: real,
+    q_min: real,
+    q_max: real,
+    velocity: real,
+    greatest: real,
+    jerk: real,
+    dt: real,
+) -> bool:
+    """Whether an actuator is so far from all limits that any braking fits: a quick test of both ends.
+
+    It takes g of the stopping distance for (A w + w^2 / A) / 2, which is never less.
+    """
+    acceleration = wp.abs(requested - v) / dt
+    eased = acceleration + real(0.5) * jerk * dt
+    speed = wp.abs(requested)
+    w = jerk * speed + real(0.5) * eased * eased
+    room = wp.min(q_max - q, q - q_min) - (wp.abs(v) + speed + greatest * dt) * dt
+    near_speed = w > jerk * velocity
+    return (
+        acceleration <= greatest
+        and not near_speed
+        and w * (eased + real(0.5) * (greatest + w / greatest)) <= room * jerk * jerk
+    )
 
 
 @wp.func
@@ -522,9 +551,12 @@ def all_bounds(m: Machine, start: Motion, requested: vec9, dt: real) -> Bounds:
     for i in range(9):
         least = hard.lower[i]
         most = hard.upper[i]
-        if m.jerk[i] > real(0.0):
-            q = start.position[i]
-            v = start.rate[i]
+        q = start.position[i]
+        v = start.rate[i]
+        if m.jerk[i] > real(0.0) and not has_room(
+            q, v, requested[i], m.position_min[i], m.position_max[i],
+            m.velocity[i], m.acceleration[i], m.jerk[i], dt,
+        ):  # fmt: skip
             up = eased_rate(
                 m.position_max[i] - q, v, requested[i], m.velocity[i], m.acceleration[i], m.jerk[i], dt
             )
