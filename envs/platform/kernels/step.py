@@ -803,9 +803,11 @@ def request(m: Machine, start: Motion, action: vec9, dt: real) -> Request:
         start.rate[0] + action[0] * dt, start.rate[1] + action[1] * dt, legs, start.rate[8] + action[8] * dt
     )
     r.bounds = all_bounds(m, start, r.rates, dt)
-    r.clear = keeps_clear(m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt) and eases_clear(
-        m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt
-    )
+    r.clear = determinant(jacobian) / m.neutral_determinant >= m.far_from_singular
+    if not r.clear:
+        r.clear = keeps_clear(
+            m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt
+        ) and eases_clear(m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt)
     r.limits = command_limits(m, start, r.bounds, r.rates, r.clear, dt)
     return r
 
