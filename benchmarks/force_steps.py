@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from motion_cueing.envs.cues import CueTrace
-from motion_cueing.envs.platform import Platform, get_platform
+from motion_cueing.envs.platform import Braking, Platform, get_platform
 from motion_cueing.envs.platform.kernels import ACTUATORS
 from motion_cueing.envs.platform.kinematics import rotation, turning_axes
 from motion_cueing.evaluation import Trajectory
@@ -135,11 +135,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--policies", nargs="+", default=AGENTS)
     parser.add_argument("--platform", default="paper")
+    parser.add_argument("--jerk", type=float, help="felt jerk with which limits brake, m/s^3; default: any")
     parser.add_argument("--splits", nargs="+", default=list(SPLITS), choices=list(SPLITS))
     parser.add_argument("--fiercest", type=int, help="drives of each split with the largest force")
     parser.add_argument("--rows", type=int, default=8, help="drives shown of each policy, the worst first")
     chosen = parser.parse_args()
     platform, console = get_platform(chosen.platform), Console(width=150)
+    platform = replace(platform, braking=Braking(chosen.jerk))
     drives = [
         cues for name in chosen.splits for cues in fiercest(get_split(name).cues.values(), chosen.fiercest)
     ]

@@ -159,10 +159,11 @@ class Braking:
 
     Args:
         jerk: Greatest jerk at the driver's head from a subsystem that brakes for an end of travel or its
-            speed limit, m/s^3; None to brake with full acceleration at the last moment.
+            speed limit, m/s^3; 150 is a good choice. None: it brakes with full acceleration, at the last
+            moment. That is the default, as the offline optimum plans so.
     """
 
-    jerk: Positive | None = 150.0
+    jerk: Positive | None = None
 
 
 @configuration
