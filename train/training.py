@@ -22,7 +22,7 @@ from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.episode import platform_of
 from .agents import Agent, PolicyNetwork, Record
-from .agents.agent import DEFAULT, base_of
+from .agents.agent import DEFAULT, base_of, find_agent
 from .config import Measure, TrainingConfig
 from .logs import TrainingLog
 from .networks import Actor, start_as_spring_damper
@@ -34,7 +34,7 @@ from .watch import References, Watch
 
 def initial_agent(config: TrainingConfig) -> Agent | None:
     """The agent of ``config.initial``, or None where nothing is named."""
-    return None if config.initial is None else Agent.load(config.initial)
+    return None if config.initial is None else find_agent(config.initial)
 
 
 def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
@@ -47,7 +47,11 @@ def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
     agent = initial_agent(config)
     if agent is None:
         return None
-    for name in ("platform", "observation", "action"):
+    # An agent that observes its machine begins on any.
+    same = (
+        ("observation", "action") if agent.task.observation.machine else ("platform", "observation", "action")
+    )
+    for name in same:
         theirs, ours = getattr(agent.task, name), getattr(config.task, name)
         if theirs != ours:
             raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {ours}")
