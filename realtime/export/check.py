@@ -163,7 +163,9 @@ def _recorded(source: Source, policy: Policy, platform: Platform, drive: CueTrac
     interface = policy.connect(Machines([drive], [platform]))
     interface.begin(policy.start_pose)
     actor = Actor(policy, 1, interface.action_size)
-    seen, done, moved = [], [], []
+    seen: list[Floats] = []
+    done: list[Floats] = []
+    moved: list[Floats] = []
     while len(moved) < len(drive) - 1:
         observation = interface.observe()
         action, _ = actor(observation)

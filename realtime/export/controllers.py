@@ -101,8 +101,8 @@ def alone(policy: Policy, to: Translator) -> Steps:
     )
 
 
-@alone.register
-def _(policy: WashoutPolicy, to: Translator) -> Steps:
+@alone.register(WashoutPolicy)
+def _(policy: WashoutPolicy[Any], to: Translator) -> Steps:
     washout = _Washout(policy, to)
     inputs = (*_CUES, *_MACHINE)
     return Steps(
@@ -186,8 +186,8 @@ def controller_of(policy: Policy, machine: Platform, to: Translator) -> Controll
     )
 
 
-@controller_of.register
-def _(policy: WashoutPolicy, machine: Platform, to: Translator) -> Controller:
+@controller_of.register(WashoutPolicy)
+def _(policy: WashoutPolicy[Any], machine: Platform, to: Translator) -> Controller:
     _bind_machine(machine, to)
     washout = _Washout(policy, to)
     state = Code("state->simulator", type_of(State), variable=True)
@@ -376,7 +376,10 @@ def _(policy: Agent, machine: Platform, to: Translator) -> Controller:
     _check_task(policy, machine)
     base = _base_of(policy, machine, to)
     own = _Environment(policy, machine, to, "agent", "")
-    lines, state, tables, types = [], [], [], []
+    lines: list[str] = []
+    state: list[str] = []
+    tables: list[str] = []
+    types: list[Type] = []
     for part in (base, own):
         if part is not None:
             state, tables, types = state + part.state, tables + part.tables, types + part.types
@@ -439,8 +442,8 @@ def _under(policy: Policy, machine: Platform, to: Translator) -> Any:
     raise _refusal(policy, "an agent's base in C is a washout or an agent")
 
 
-@_under.register
-def _(policy: WashoutPolicy, machine: Platform, to: Translator) -> Any:
+@_under.register(WashoutPolicy)
+def _(policy: WashoutPolicy[Any], machine: Platform, to: Translator) -> Any:
     washout = controller_of(policy, machine, to)
     lines = [one for one in washout.act if "acceleration" not in one and "begun = true" not in one]
     return _Part(washout.state, [], washout.types, [*lines, "const vec9 base = answer.action;"])

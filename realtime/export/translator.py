@@ -259,7 +259,7 @@ class Translator:
         return Code(f"{known.name}({', '.join(given)})", known.result)
 
     def _name(self, function: Any, kinds: tuple[Type | None, ...]) -> str:
-        name = function.func.__name__ + "".join(f"_{kind.name}" for kind in kinds if kind)
+        name: str = function.func.__name__ + "".join(f"_{kind.name}" for kind in kinds if kind)
         taken = {one.name for one in self._known.values()}
         while name in taken or name in _RESERVED:
             name += "_"
