@@ -18,6 +18,7 @@ from ...baselines.washout.classical.policies import ScheduledWashout
 from ...baselines.washout.kernels.blocks import Reading, read_state
 from ...baselines.washout.policy import WashoutPolicy
 from ...envs.arrays import float_rows, pair_array, real_rows, vec9
+from ...envs.cues import GRAVITY
 from ...envs.errors import ConfigurationError
 from ...envs.platform.kernels import step as platform
 from ...envs.platform.kernels.step import Machine, Motion
@@ -25,7 +26,7 @@ from ...envs.platform.kinematics import legs_of_pose
 from ...envs.platform.machines import Platform
 from ...envs.platform.parameters import machine_parameters
 from ...envs.simulator.kernels import step as simulator
-from ...envs.simulator.kernels.observation import OBSERVATION_SIZE
+from ...envs.simulator.kernels.observation import OBSERVATION_SIZE, SCALES
 from ...envs.simulator.kernels.step import State
 from ...envs.simulator.simulator import TIME_STEP
 from ...envs.task.arrays import rules_of
@@ -34,8 +35,8 @@ from ...envs.task.kernels import observation as task_observation
 from ...train.agents import Agent
 from .network import network_code
 from .source import Signal, Steps, array_text
-from .translator import Code, Translator
-from .types import FLOAT, INT, REAL, Type, type_of
+from .translator import Translator
+from .types import FLOAT, INT, REAL, Code, Type, number, type_of
 
 _CUES: Final = (
     Signal("force", "force", 3, "real", "m/s^2", "specific force of the car at the driver's place"),
@@ -233,8 +234,6 @@ class _Washout:
 
 
 def _time_step(to: Translator, seconds: float) -> str:
-    from .types import number
-
     return f"static const real TIME_STEP = {number(seconds, to.single)};"
 
 
@@ -649,11 +648,9 @@ class _Environment:
         if not self._lows:
             return []
         role, p, to = self._role, self._prefix, self._to
-        from .types import number
-
         poles = [number(np.exp(-TIME_STEP / one), to.single) for one in self._seen.memory]
-        one, gravity = number(1.0, to.single), number(9.81, to.single)
-        scale = number(10.0, to.single)
+        one, gravity = number(1.0, to.single), number(GRAVITY, to.single)
+        scale = number(SCALES["reference_force"], to.single)
         return [
             f"static const real {role}_poles[{len(poles)}] = {{{', '.join(poles)}}};",
             f"float {role}_memory_data[{self._lows}];",

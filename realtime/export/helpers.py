@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from .types import BOOL, FLOAT, INT, REAL, UINT64, Type, number
-
-if TYPE_CHECKING:
-    from .translator import Code
+from .types import BOOL, FLOAT, REAL, UINT64, Code, Type, number
 
 _ELEMENTWISE: Final = {"add": "+", "subtract": "-", "multiply": "*"}
 
@@ -205,8 +202,6 @@ class Helpers:
 
     def builtin(self, name: str, given: list[Code]) -> Code:
         """A call of one of Warp's own functions."""
-        from .translator import Code
-
         first = given[0].type
         texts = ", ".join(one.text for one in given)
         if name in ("sin", "cos", "tan", "sqrt", "atan2", "floor", "ceil"):
@@ -273,6 +268,3 @@ def _loops(kind: Type) -> tuple[str, str, str]:
 
 def _function(result: str, name: str, parameters: str, body: str) -> str:
     return f"static {result} {name}({parameters}) {{\n{body}\n}}"
-
-
-__all__ = ["INT", "Helpers"]

@@ -12,10 +12,9 @@ arguments that nothing reads.
 from __future__ import annotations
 
 import ast
-import copy
 import inspect
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -25,7 +24,22 @@ import warp as wp
 from ...envs.arrays import real
 from ...envs.errors import MotionCueingError
 from .helpers import Helpers
-from .types import BOOL, FLOAT, INT, REAL, UINT64, VOID, Type, about, fields_of, number, struct_name, type_of
+from .pruning import Pruner, assigned_in, flows_to, nodes_of, root_of, without, without_unread
+from .types import (
+    BOOL,
+    FLOAT,
+    INT,
+    REAL,
+    UINT64,
+    VOID,
+    Code,
+    Type,
+    about,
+    fields_of,
+    number,
+    struct_name,
+    type_of,
+)
 
 _RESERVED: Final = frozenset(
     [
@@ -85,29 +99,6 @@ _UNARY: Final = 9
 
 class TranslationError(MotionCueingError, NotImplementedError):
     """A function uses a part of Python that has no form in C here."""
-
-
-@dataclass(frozen=True)
-class Code:
-    """An expression of C.
-
-    Args:
-        text: Its text.
-        type: Its type.
-        strength: How strongly its outermost operator binds.
-        path: The constant that it is, as "MACHINE.geometry"; None for none.
-        variable: Whether it has an address.
-    """
-
-    text: str
-    type: Type
-    strength: int = _PRIMARY
-    path: str | None = None
-    variable: bool = False
-
-    def within(self, strength: int) -> str:
-        """Its text as an operand of an operator that binds so strongly."""
-        return self.text if self.strength >= strength else f"({self.text})"
 
 
 @dataclass
@@ -337,20 +328,22 @@ class _Function:
         body = self._tree.body
         if isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
             body = body[1:]
-        body = self._pruned(body, self._known_values())
+        prune = Pruner(self._tree, self._globals, self._bound, self._to.value)
+        body = prune(body)
+        self._given.update(prune.aliases)
         while True:
             # A variable may turn out to be unread only where the functions that it is given to are known.
-            body = self._without_dead(body)
+            body = without_unread(body)
             text = self._written_out(name, body)
             unread = self._every - set(self._arguments) - self._read - self._loops
             dead = [
                 node
-                for node in _all(body)
-                if isinstance(node, ast.Assign) and getattr(_root(node.targets[0]), "id", None) in unread
+                for node in nodes_of(body)
+                if isinstance(node, ast.Assign) and getattr(root_of(node.targets[0]), "id", None) in unread
             ]
             if not dead:
                 return text
-            body = _removed(body, dead)
+            body = without(body, dead)
 
     def _written_out(self, name: str, body: list[ast.stmt]) -> Translated:
         """The function of C with these statements."""
@@ -359,15 +352,15 @@ class _Function:
         self._pointers = {one for one in self._arguments if self._variables[one].kind == "struct"}
         returns = self._tree.returns
         kind = type_of(self._evaluated(ast.unparse(returns))) if returns is not None else VOID
-        values = [node.value for node in _all(body) if isinstance(node, ast.Return)]
+        values = [node.value for node in nodes_of(body) if isinstance(node, ast.Return)]
         # A function that always returns 0 is called for what it writes.
         nothing = kind == INT and all(isinstance(one, ast.Constant) and one.value == 0 for one in values)
         self._result = VOID if nothing else kind
         changed = {
             target.id
-            for node in _all(body)
+            for node in nodes_of(body)
             if isinstance(node, ast.Assign)
-            for target in map(_root, node.targets)
+            for target in map(root_of, node.targets)
             if target is not None and target.id in self._arguments
         }
         copied = sorted(one for one in changed if one in self._pointers)
@@ -397,140 +390,6 @@ class _Function:
             self._variables[name] = kind
         return kind.declaration(_c(name))
 
-    # Constants that are known now switch branches off.
-
-    def _known_values(self) -> dict[str, Any]:
-        return {name: self._to.value(path) for name, path in self._bound.items()}
-
-    def _value(self, node: ast.expr, known: dict[str, Any]) -> Any:
-        """The value of an expression of constants; raises where it is not known."""
-        for part in ast.walk(node):
-            if isinstance(part, ast.Name) and part.id not in known and part.id in self._locals:
-                raise LookupError(part.id)
-            if isinstance(part, ast.Call) and ast.unparse(part.func) not in (
-                "real",
-                "bool",
-                "int",
-                "wp.static",
-            ):
-                raise LookupError(ast.unparse(part))
-        spaces = {**self._globals, **known, "real": float}
-        return eval(compile(ast.Expression(_static_free(node)), "<constant>", "eval"), spaces)
-
-    @property
-    def _locals(self) -> set[str]:
-        stored = {
-            n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-        }
-        return stored | set(self._arguments)
-
-    def _folded(self, node: ast.expr, known: dict[str, Any]) -> ast.expr:
-        """A condition with its known parts replaced by True or False."""
-        try:
-            return ast.Constant(bool(self._value(node, known)))
-        except Exception:  # It is not known.
-            pass
-        if isinstance(node, ast.BoolOp):
-            decisive = isinstance(node.op, ast.Or)
-            parts = [self._folded(one, known) for one in node.values]
-            if any(isinstance(one, ast.Constant) and one.value is decisive for one in parts):
-                return ast.Constant(decisive)
-            left = [one for one in parts if not isinstance(one, ast.Constant)]
-            if len(left) == 1:
-                return left[0]
-            return ast.copy_location(ast.BoolOp(node.op, left), node)
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-            inner = self._folded(node.operand, known)
-            return (
-                ast.Constant(not inner.value)
-                if isinstance(inner, ast.Constant)
-                else ast.UnaryOp(node.op, inner)
-            )
-        return node
-
-    def _pruned(self, body: Iterable[ast.stmt], known: dict[str, Any]) -> list[ast.stmt]:
-        """Statements without the branches that are switched off."""
-        out: list[ast.stmt] = []
-        assigned = [
-            target.id
-            for node in ast.walk(self._tree)
-            if isinstance(node, ast.Assign)
-            for target in map(_root, node.targets)
-            if target is not None
-        ]
-        for given in body:
-            statement = copy.copy(given)
-            if isinstance(statement, ast.If):
-                test = self._folded(statement.test, known)
-                if isinstance(test, ast.Constant):
-                    out += self._pruned(statement.body if test.value else statement.orelse, known)
-                else:
-                    statement.test = test
-                    statement.body = self._pruned(statement.body, known)
-                    statement.orelse = self._pruned(statement.orelse, known)
-                    if statement.body or statement.orelse:
-                        out.append(statement)
-            elif isinstance(statement, ast.For | ast.While):
-                statement.body = self._pruned(statement.body, known)
-                if statement.body and not self._never(statement, known):
-                    out.append(statement)
-            else:
-                if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-                    name = statement.targets[0].id
-                    path = self._path(statement.value)
-                    if path and assigned.count(name) == 1:
-                        # Another name of a table.
-                        value = self._to.value(path)
-                        if hasattr(value, "_cls"):
-                            known[name], self._bound[name] = value, path
-                            self._given[name] = self._variables[name] = type_of(value._cls)
-                            continue
-                    condition = isinstance(statement.value, ast.BoolOp | ast.Compare)
-                    if condition and assigned.count(name) == 1:
-                        statement.value = self._folded(statement.value, known)
-                        if isinstance(statement.value, ast.Constant):
-                            known[name] = statement.value.value
-                out.append(statement)
-            if out and isinstance(out[-1], ast.Return):
-                break
-        return out
-
-    def _path(self, node: ast.expr) -> str | None:
-        """The constant that an expression is, by its path."""
-        if isinstance(node, ast.Name):
-            return self._bound.get(node.id)
-        inner = self._path(node.value) if isinstance(node, ast.Attribute) else None
-        return f"{inner}.{node.attr}" if inner and isinstance(node, ast.Attribute) else None
-
-    def _never(self, loop: ast.For | ast.While, known: dict[str, Any]) -> bool:
-        """Whether a loop is over nothing."""
-        try:
-            if isinstance(loop, ast.While):
-                return not self._value(loop.test, known)
-            assert isinstance(loop.iter, ast.Call)
-            return not len(range(*(self._value(one, known) for one in loop.iter.args)))
-        except Exception:  # It is not known.
-            return False
-
-    def _without_dead(self, body: list[ast.stmt]) -> list[ast.stmt]:
-        """Statements without variables that nothing reads."""
-        while True:
-            read = {
-                node.id
-                for node in _all(body)
-                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
-            }
-            dead = [
-                node
-                for node in _all(body)
-                if isinstance(node, ast.Assign)
-                and isinstance(node.targets[0], ast.Name)
-                and node.targets[0].id not in read
-            ]
-            if not dead:
-                return body
-            body = _removed(body, dead)
-
     # Statements.
 
     def _block(self, body: Sequence[ast.stmt], depth: int) -> list[str]:
@@ -548,8 +407,8 @@ class _Function:
         """Variables that a block inside of this statement assigns first, and that are read after it."""
         lines = []
         if isinstance(statement, ast.If | ast.While):
-            for name in _stored([statement]):
-                if name in self._declared or not _flows(name, rest[1:]):
+            for name in assigned_in([statement]):
+                if name in self._declared or not flows_to(name, rest[1:]):
                     continue
                 value = next(
                     node.value
@@ -636,7 +495,7 @@ class _Function:
                 raise self._error(node)
             return f"{value.type.name} {_c(name)} = {_bare(value.text)};"
         place = self._expression(target)
-        root = _root(target)
+        root = root_of(target)
         if root is not None:
             self._written.add(root.id)
         return f"{place.text} = {_bare(self._to.converted(value, place.type).text)};"
@@ -676,7 +535,7 @@ class _Function:
         return Code(text, REAL, _UNARY if text.startswith("-") else _PRIMARY)
 
     def _is_local(self, node: ast.expr) -> bool:
-        root = _root(node)
+        root = root_of(node)
         return root is None or root.id in self._variables
 
     def _named(self, node: ast.Name | ast.Attribute) -> Code:
@@ -866,84 +725,6 @@ def _c(name: str) -> str:
 def _bare(text: str) -> str:
     """A pointer's content, as the whole of a side of an assignment."""
     return text[1:-1] if text.startswith("(*") and text.count("(") == 1 and text.endswith(")") else text
-
-
-def _root(node: ast.expr) -> ast.Name | None:
-    """The variable that an expression is a part of."""
-    while isinstance(node, ast.Attribute | ast.Subscript):
-        node = node.value
-    return node if isinstance(node, ast.Name) else None
-
-
-def _all(body: Iterable[ast.stmt]) -> Iterator[ast.AST]:
-    for statement in body:
-        yield from ast.walk(statement)
-
-
-def _stored(body: Iterable[ast.stmt]) -> list[str]:
-    """Names that statements assign, in order."""
-    names = [
-        node.targets[0].id
-        for node in _all(body)
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-    ]
-    return list(dict.fromkeys(names))
-
-
-def _flows(name: str, rest: Sequence[ast.stmt]) -> bool:
-    """Whether later statements read a variable before they assign it."""
-    for node in _all(rest):
-        if isinstance(node, ast.Name) and node.id == name:
-            # In ast.walk a statement comes before its parts, and an assignment lists its target first.
-            return not _assigned_first(name, rest)
-    return False
-
-
-def _assigned_first(name: str, rest: Sequence[ast.stmt]) -> bool:
-    for statement in rest:
-        reads = any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(statement))
-        if reads:
-            if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
-                inside = any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(statement.value))
-                return statement.targets[0].id == name and not inside
-            if isinstance(statement, ast.For):
-                return _assigned_first(name, statement.body)
-            return False
-    return False
-
-
-def _removed(body: list[ast.stmt], dead: list[Any]) -> list[ast.stmt]:
-    """Statements without some of them, at any depth."""
-    out = []
-    for statement in body:
-        if any(statement is one for one in dead):
-            continue
-        if isinstance(statement, ast.If | ast.For | ast.While):
-            statement.body = _removed(statement.body, dead)
-            if isinstance(statement, ast.If):
-                statement.orelse = _removed(statement.orelse, dead)
-                if not statement.body and not statement.orelse:
-                    continue
-            if not statement.body:
-                if isinstance(statement, ast.If):
-                    statement.test, statement.body = ast.UnaryOp(ast.Not(), statement.test), statement.orelse
-                    statement.orelse = []
-                else:
-                    continue
-        out.append(statement)
-    return out
-
-
-def _static_free(node: ast.expr) -> ast.expr:
-    """An expression whose ``wp.static(x)`` is x."""
-
-    class Bare(ast.NodeTransformer):
-        def visit_Call(self, call: ast.Call) -> ast.expr:
-            self.generic_visit(call)
-            return call.args[0] if ast.unparse(call.func) == "wp.static" else call
-
-    bare: ast.expr = Bare().visit(copy.deepcopy(node))
-    return ast.fix_missing_locations(bare)
 
 
 def _comment(text: str) -> str:

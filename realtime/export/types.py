@@ -61,6 +61,29 @@ class Type:
         return f"{self.name} {name}"
 
 
+@dataclass(frozen=True)
+class Code:
+    """An expression of C.
+
+    Args:
+        text: Its text.
+        type: Its type.
+        strength: How strongly its outermost operator binds.
+        path: The constant that it is, as "MACHINE.geometry"; None for none.
+        variable: Whether it has an address.
+    """
+
+    text: str
+    type: Type
+    strength: int = 10
+    path: str | None = None
+    variable: bool = False
+
+    def within(self, strength: int) -> str:
+        """Its text as an operand of an operator that binds so strongly."""
+        return self.text if self.strength >= strength else f"({self.text})"
+
+
 _GENERIC: Final = ("Step", "Command")
 """Names of structs of more than one package."""
 

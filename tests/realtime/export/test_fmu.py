@@ -130,7 +130,6 @@ def test_it_holds_its_sources_and_the_same_content_is_the_same_file(tmp_path):
 @needs_compiler
 def test_it_begins_where_the_machine_stands(tmp_path):
     policy = make_policy("classical", PAPER)
-    source = make_source(policy, PAPER)
     moved = type(policy)(
         policy.parameters.__class__(**{**vars(policy.parameters), "start_hexapod": (0.1, 0.0, 0.05)})
     )

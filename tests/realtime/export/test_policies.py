@@ -30,6 +30,8 @@ ROUNDING = 1e-12
 """Of double precision, over a drive."""
 NETWORK = 1e-6
 """Networks compute in single precision, in C as in Python."""
+DRIVEN = 5e-6
+"""The machine integrates what their rounding differs; the largest of all drives is 2e-6."""
 
 PAIRS = [
     ("classical", "paper", "lane-change"),
@@ -52,8 +54,8 @@ PAIRS = [
 """Every family and every agent of the package, and every machine."""
 
 
-def accuracy(name: str) -> float:
-    return NETWORK if name.startswith(("learned", "linear")) else ROUNDING
+def is_agent(name: str) -> bool:
+    return name.startswith(("learned", "linear"))
 
 
 @needs_compiler
@@ -62,7 +64,7 @@ def test_the_whole_step_equals_the_simulators(name, machine, maneuver, tmp_path)
     platform = get_platform(machine)
     policy = make_policy(name, platform)
     found = compare(compiled(tmp_path, policy, platform), policy, platform, get_maneuver(maneuver).drive())
-    assert found.difference < accuracy(name)
+    assert found.difference < (DRIVEN if is_agent(name) else ROUNDING)
 
 
 @needs_compiler
@@ -71,7 +73,7 @@ def test_a_policy_by_itself_equals_predict(name, machine, maneuver, tmp_path):
     platform = get_platform(machine)
     policy = make_policy(name, platform)
     found = compare(compiled(tmp_path, policy), policy, platform, get_maneuver(maneuver).drive())
-    assert found.difference < accuracy(name)
+    assert found.difference < (NETWORK if is_agent(name) else ROUNDING)
 
 
 @needs_compiler

@@ -11,8 +11,8 @@ import warp as wp
 from motion_cueing.envs.arrays import mat33, mat63, real, vec2, vec3, vec6
 from motion_cueing.realtime.export.check import WARNINGS, run_compiler
 from motion_cueing.realtime.export.source import Steps, write_source
-from motion_cueing.realtime.export.translator import Code, TranslationError, Translator
-from motion_cueing.realtime.export.types import INT, REAL, type_of
+from motion_cueing.realtime.export.translator import TranslationError, Translator
+from motion_cueing.realtime.export.types import INT, REAL, Code, type_of
 
 from . import needs_compiler
 
