@@ -117,11 +117,6 @@ class Translated:
     text: str = ""
     passed: dict[str, Type] = field(default_factory=dict)
 
-    @property
-    def prototype(self) -> str:
-        """The first line of its definition."""
-        return self.text[self.text.index(f"static {self.result.name} ") : self.text.index(" {")]
-
 
 class Translator:
     """Functions, structs and constants of one export.
@@ -573,7 +568,9 @@ class _Function:
         raise self._error(node)
 
     def _number(self, name: str, code: Code) -> Code:
-        self._to.numbers[name] = f"static const {code.type.name} {name} = {code.text};"
+        line = f"static const {code.type.name} {name} = {code.text};"
+        if self._to.numbers.setdefault(name, line) != line:
+            raise TranslationError(f"{self._function.key}: two modules have a number called {name}")
         return Code(name, code.type)
 
     def _of_precision(self, name: str, value: Any) -> Any:
