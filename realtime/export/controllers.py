@@ -36,7 +36,7 @@ from ...train.agents import Agent
 from .network import network_code
 from .source import Signal, Steps, array_text
 from .translator import Translator
-from .types import FLOAT, INT, REAL, Code, Type, number, type_of
+from .types import FLOAT, INT, REAL, UINT64, Code, Type, number, type_of
 
 _CUES: Final = (
     Signal("force", "force", 3, "real", "m/s^2", "specific force of the car at the driver's place"),
@@ -248,10 +248,18 @@ def _whole_step(controller: Controller, machine: Platform, to: Translator, start
     """The whole step, from cues to set-points, around a controller."""
     to.numbers["TIME_STEP"] = _time_step(to, TIME_STEP)
     to.use(Motion)
-    to.use(State, "setpoint", "reference_cue")
+    to.use(State, "setpoint", "setpoint_acceleration", "limits", "reference_cue")
     setpoint = Code("simulator->setpoint", type_of(Motion), variable=True)
     dt = Code("TIME_STEP", REAL)
-    moved = to.call(platform.command, _MACHINE_CODE, setpoint, Code("acceleration", type_of(vec9)), dt)
+    moved = to.call(
+        platform.command,
+        _MACHINE_CODE,
+        setpoint,
+        Code("simulator->setpoint_acceleration", type_of(vec9), variable=True),
+        Code("simulator->limits", UINT64, variable=True),
+        Code("acceleration", type_of(vec9)),
+        dt,
+    )
     mean = to.call(
         platform.mean_acceleration, setpoint, Code("moved.motion", type_of(Motion), variable=True), dt
     )
@@ -303,6 +311,8 @@ def _whole_step(controller: Controller, machine: Platform, to: Translator, start
             f"const vec9 mean = {mean.text};",
             *controller.moved,
             "simulator->setpoint = moved.motion;",
+            "simulator->setpoint_acceleration = mean;",
+            "simulator->limits = moved.limits;",
             *_set_points(),
         ],
         time_step=TIME_STEP,
@@ -400,7 +410,7 @@ def _(policy: Agent, machine: Platform, to: Translator) -> Controller:
         tables=tables,
         ahead=ahead,
         spacing=policy.task.observation.preview_spacing,
-        moved=("simulator->setpoint_acceleration = mean;", *sensed),
+        moved=sensed,
         beginning=at_rest,
     )
 
