@@ -1,7 +1,7 @@
 "use strict";
 /* A drive that plays: one or two machines, the car on its road, the moment, and plots over time. */
 
-const CAR_COLOR = "#1a1a1a", DEGREES = 180 / Math.PI, FRAME = 1 / 30;
+const CAR_COLOR = "#1a1a1a", FRAME = 1 / 30;
 
 /** A packed drive with its arrays. */
 async function unpackDrive(content, missing) {
@@ -79,49 +79,33 @@ class Film {
   machines(names) {
     const holder = this.find(".stages");
     holder.classList.toggle("pair", names.length > 1);
-    while (this.stages.length > names.length) {
-      const { stage, panel } = this.stages.pop();
-      stage.dispose();
-      panel.remove();
-    }
+    while (this.stages.length > names.length) this.stages.pop().remove();
     names.forEach((name, i) => {
       const { color } = this.style(name), known = this.stages[i];
       if (known && known.color === color) {
-        known.name.textContent = name;
+        known.rename(name);
         return;
       }
-      const panel = this.panel(name);
-      if (known) {
-        known.stage.dispose();
-        known.panel.replaceWith(panel);
-      } else holder.append(panel);
-      panel.style.setProperty("--policy", color);
-      const stage = new Stage(panel.querySelector(".picture"), this.scene, color);
+      const machine = new Machine(this.scene, name, color, (panel) => {
+        if (known) known.panel.replaceWith(panel); else holder.append(panel);
+      });
+      known?.stage.dispose();
+      const { stage } = machine, other = this.stages[i ? 0 : 1]?.stage;
       stage.view(this.mode);
-      const other = this.stages[i ? 0 : 1]?.stage;
       if (other) {
         stage.camera.position.copy(other.camera.position);
         stage.controls.target.copy(other.controls.target);
         stage.place = [...other.place];
         stage.controls.update();
       }
-      this.stages[i] = { stage, panel, color, name: panel.querySelector(".name"), score: panel.querySelector(".score"),
-        bars: [...panel.querySelectorAll(".leg i")], carriage: panel.querySelector(".travel") };
+      this.stages[i] = machine;
       stage.controls.addEventListener("change", () => this.together(stage));
       stage.onView = () => this.together(stage);
     });
-    for (const [i, one] of this.stages.entries()) {
+    this.stages.forEach((machine, i) => {
       const { error } = this.drive.policies[names[i]];
-      one.score.textContent = error === undefined ? "" : `J ${Charts.number(error)}`;
-      one.stage.canvas.setAttribute("role", "img");
-      one.stage.canvas.setAttribute("aria-label", `The machine as ${names[i]} moves it`);
-    }
-  }
-
-  panel(name) {
-    const panel = document.querySelector("template.machine").content.firstElementChild.cloneNode(true);
-    panel.querySelector(".name").textContent = name;
-    return panel;
+      machine.score.textContent = error === undefined ? "" : `J ${Charts.number(error)}`;
+    });
   }
 
   /** The machines are seen from the same place beside each. */
@@ -158,31 +142,13 @@ class Film {
     this.scrubber.setAttribute("aria-valuetext", text);
     this.find(".clock").textContent = `${text} of ${last.toFixed(1)} s`;
     this.names.forEach((name, i) => {
-      const { time: times, pose, force } = this.drive.policies[name], { stage } = this.stages[i];
-      stage.pose(pose.map((values) => interpolate(times, values, this.time)));
-      const { car } = this.drive;
-      stage.cues(car.force.map((values) => interpolate(car.time, values, this.time)),
-        force.map((values) => interpolate(times, values, this.time)));
-      this.instruments(this.stages[i], pose.map((values) => interpolate(times, values, this.time)));
+      const { time, pose, force } = this.drive.policies[name], { car } = this.drive;
+      const at = (times, columns) => columns.map((values) => interpolate(times, values, this.time));
+      this.stages[i].move(at(time, pose), at(car.time, car.force), at(time, force));
     });
     this.charts.mark(this.time);
     this.draw();
     this.onSeek?.(this.time);
-  }
-
-  instruments(one, pose) {
-    one.bars.forEach((bar, i) => {
-      const use = one.stage.use[i], size = Math.min(Math.abs(use), 1);
-      bar.style.height = `${(50 * size).toFixed(1)}%`;
-      bar.style[use >= 0 ? "bottom" : "top"] = "50%";
-      bar.style[use >= 0 ? "top" : "bottom"] = "auto";
-      bar.style.background = `rgb(${one.stage.color(use)})`;
-    });
-    const parts = [];
-    if (this.scene.carriage) parts.push(`carriage ${Charts.number(pose[0])}, ${Charts.number(pose[1])} m`);
-    if (this.scene.turntable) parts.push(`turntable ${Charts.number(pose[8] * DEGREES)}°`);
-    const text = parts.join(" · ");
-    if (one.carriage.textContent !== text) one.carriage.textContent = text;
   }
 
   draw() {

@@ -23,6 +23,7 @@ LIBRARIES: Final = (
     "view/three.iife.min.js",
     "view/stage.js",
     "view/charts.js",
+    "view/machine.js",
     "view/film.js",
 )
 """What every page with a machine in it needs, in this order."""
@@ -58,6 +59,23 @@ def save_view(
 ) -> None:
     """Write the page, whole or not at all."""
     write_text(path, render_view(drives, platform, title))
+
+
+def render_live(platform: Platform, policy: str, states: Mapping[int, str]) -> str:
+    """The page of a machine that moves now; it reads the stream of events ``/frames`` of its server.
+
+    Args:
+        platform: The machine.
+        policy: Name of the policy.
+        states: States of the controller in words.
+    """
+    return template("view/live.html").render(
+        title=f"{policy} on the motion base {platform.name}, live",
+        styles=assets(*STYLES),
+        scripts=assets(*LIBRARIES, "view/live.js"),
+        about=script_json({"policy": policy, "states": states}),
+        scene=deflated(scene_of(platform)),
+    )
 
 
 def deflated(content: Any) -> str:
