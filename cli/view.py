@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _MANEUVER: Final = "double-lane-change"
 _PLATFORM: Final = "paper"
-_AGENT: Final = "best.safetensors"
+AGENT: Final = "best.safetensors"
 """Of a training, in its folder."""
 
 
@@ -128,10 +128,10 @@ def _sorted(runs: tuple[str, ...]) -> tuple[list[str], list[Path]]:
             found = sorted((path / "trajectories").glob("*.npz")) or sorted(path.glob("*.npz"))
             if found:
                 files += found
-            elif (path / _AGENT).is_file():
-                policies.append(str(path / _AGENT))
+            elif (path / AGENT).is_file():
+                policies.append(str(path / AGENT))
             else:
-                raise DataError(f"{run}: no trajectories and no {_AGENT} there; name a folder of results")
+                raise DataError(f"{run}: no trajectories and no {AGENT} there; name a folder of results")
         else:
             policies.append(run)
     return policies, files
