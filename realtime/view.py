@@ -102,7 +102,8 @@ class Frames:
         seen = 0
         while True:
             with self._news:
-                self._news.wait_for(lambda seen=seen: self._count > seen, _PATIENCE)
+                if self._count == seen:
+                    self._news.wait(_PATIENCE)
                 frame, seen = self._newest, self._count
             if frame is not None:
                 yield frame

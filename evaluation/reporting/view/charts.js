@@ -8,11 +8,12 @@ class Charts {
    * @param {HTMLElement} holder Where they are.
    * @param {{title: string, unit: string, least?: number, log?: boolean}[]} panels What they show.
    * @param {(time: number) => void} seek Called with the moment that a person points at.
+   * @param {boolean} plain Whether there is no moment to mark.
    */
-  constructor(holder, panels, seek = null, axis = "s") {
+  constructor(holder, panels, seek = null, plain = false) {
     this.holder = holder;
     this.seek = seek;
-    this.axis = axis;
+    this.plain = plain;
     this.moment = null;
     this.charts = [];
     this.panels = panels.map((panel) => {
@@ -45,7 +46,7 @@ class Charts {
     this.lines = lines;
     this.charts.forEach((u) => u?.destroy());
     this.charts = this.panels.map((panel, p) => this.make(panel, p));
-    this.mark(this.moment ?? lines[0].time[0]);
+    if (!this.plain) this.mark(this.moment ?? lines[0].time[0]);
   }
 
   make(panel, p) {
@@ -69,7 +70,9 @@ class Charts {
           range: (_, low, high) => {
             if (low === null || low === undefined) return [0, 1];
             if (panel.log) return [low / 1.2, high * 1.2];
-            const lack = Math.max((panel.least || 0) - (high - low), 0) / 2, room = 0.06 * (high - low);
+            // A line of one value has room, too.
+            const least = panel.least || Math.max(0.02 * Math.abs(high), 1e-3);
+            const lack = Math.max(least - (high - low), 0) / 2, room = 0.06 * (high - low);
             return [low - lack - room, high + lack + room];
           },
         },

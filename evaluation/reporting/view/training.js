@@ -22,9 +22,8 @@
       const holder = document.createElement("div");
       holder.className = "charts";
       byId("log").replaceChildren(holder);
-      charts = new Charts(holder, plots.map(({ title, log }) => ({ title, log, unit: "" })));
+      charts = new Charts(holder, plots.map(({ title, log }) => ({ title, log, unit: "" })), null, true);
     }
-    charts.moment = null;
     charts.show(plots.flatMap(({ lines }, p) => lines.map(({ values, ...line }) => {
       const columns = [];
       columns[p] = values;

@@ -93,7 +93,7 @@ def _words(name: str) -> str:
 
 def lines_of(plot: Plot, rows: Rows) -> list[dict[str, Any]]:
     """The lines of a plot, as JSON; a line of one value is drawn over all steps."""
-    lines = []
+    lines: list[dict[str, Any]] = []
     last = max(row[_STEPS] for row in rows) / _MILLION
     for column, label in plot.columns.items():
         known = [
@@ -104,7 +104,7 @@ def lines_of(plot: Plot, rows: Rows) -> list[dict[str, Any]]:
         if not known:
             continue
         if len(known) == 1:
-            known = [known[0], (max(last, known[0][0] + 1e-6), known[0][1])]
+            known = [known[0], (max(last, known[0][0] + 1e-3), known[0][1])]
         k = len(lines)
         lines.append(
             {
