@@ -78,7 +78,7 @@ class Charts {
         },
       },
       axes: [
-        axis(2, { size: 24, values: (_, ticks) => ticks.map((t) => `${+t.toPrecision(4)}`) }),
+        axis(2, { size: 24, values: (_, ticks) => ticks.map((t) => `${+t.toPrecision(6)}`) }),
         axis(3, { size: 50, values: (_, ticks) => ticks.map((t) => (t === null ? "" : `${+t.toPrecision(3)}`)) }),
       ],
       series: [{}, ...shown.map((line) => ({

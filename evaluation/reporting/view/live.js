@@ -12,7 +12,7 @@
     { title: "Yaw rate", unit: "deg/s", least: 5 },
   ]);
   const rows = [];
-  let frames = 0, drawn = 0, waiting = 0;
+  let frames = 0, drawn = 0, waiting = 0, begin;
 
   function plot() {
     if (rows.length < 2) return;
@@ -28,6 +28,8 @@
   const stream = new EventSource("/frames");
   stream.onmessage = (event) => {
     const row = JSON.parse(event.data);
+    // Seconds since the page was opened.
+    row.time -= begin ??= row.time;
     frames++;
     rows.push(row);
     while (rows[0].time < row.time - WINDOW) rows.shift();
