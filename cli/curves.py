@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 
 from ..envs.errors import ConfigurationError, DataError, look_up
 from ..envs.storage import check_file, replacing
-from .arguments import option, several
+from .arguments import (
+    ManeuverName,
+    PlatformName,
+    Whole,
+    find_car,
+    find_maneuver,
+    find_platform,
+    make_policy,
+    option,
+    several,
+)
 
 Curve = NDArray[np.float64]
 """(2, k) steps and values."""
@@ -42,16 +52,27 @@ class CurvesCommand:
 
     runs: Annotated[tuple[Path, ...], several("DIR ...")] = field(kw_only=False)
     """Folders that `motion-cueing train` made."""
-    out: Annotated[Path, option("FILE.png|FILE.svg")]
-    """Picture to write."""
+    out: Annotated[Path | None, option("FILE.png|FILE.svg")] = None
+    """Picture to write; needed without --live."""
     scalar: str = _J
     """Column of log.csv."""
+    live: bool = False
+    """Show one training as it goes on instead: a page on this machine with its log, and the film of
+    its best agent so far in --maneuver."""
+    maneuver: ManeuverName = "double-lane-change"
+    platform: PlatformName = "paper"
+    port: Whole = 0
+    """Port on this machine for the page; 0 for any that is free."""
 
 
 def run(command: CurvesCommand) -> int:
-    """Draw, and print where each training ended."""
+    """Draw, and print where each training ended; or serve the page."""
     from ..evaluation.reporting.figures import styled
 
+    if command.live:
+        return _show_live(command)
+    if command.out is None:
+        raise ConfigurationError("name the picture to write, as in --out curves.png, or give --live")
     if command.out.suffix not in _SUFFIXES:
         raise ConfigurationError(f"--out {command.out}: name a file that ends in {' or '.join(_SUFFIXES)}")
     check_file("--out", command.out)
@@ -66,6 +87,34 @@ def run(command: CurvesCommand) -> int:
         print(f"{name}: lowest {command.scalar} {best.mean():.3g} ({best.min():.3g} to {best.max():.3g})")
     print(f"{command.out}: {len(curves)} trainings")
     return 0
+
+
+def _show_live(command: CurvesCommand) -> int:
+    """Serve the page of one training until Ctrl-C."""
+    from ..evaluation.reporting.view.server import PageServer, Routes
+    from ..evaluation.reporting.view.training import TrainingPage, drive_with
+    from ..train.logs import read_log
+    from .view import AGENT, serve
+
+    if len(command.runs) != 1 or command.out is not None:
+        raise ConfigurationError("--live shows one folder and writes nothing; leave the rest out")
+    (folder,) = command.runs
+    if not folder.is_dir():
+        raise DataError(f"{folder}: there is no such folder; name that of a training")
+    platform, car = find_platform(command.platform), find_car("sedan")
+    label, source = find_maneuver(command.maneuver, car)
+    cues = replace(source(), name=label)
+    page = TrainingPage(
+        folder,
+        lambda: read_log(folder),
+        folder / AGENT,
+        drive_with(make_policy, cues, platform),
+        cues,
+        platform,
+    )
+    text = page.render()
+    routes = Routes(lambda: text, {"/log": page.log, "/film": page.film})
+    return serve(PageServer(routes, command.port), browser=False)
 
 
 LEARNING: Final = "learning.png"

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from ..envs.errors import ConfigurationError
 from ..envs.progress import drives_progress
@@ -34,6 +34,10 @@ if TYPE_CHECKING:
     from ..evaluation.trajectory import Trajectory
 
 
+VIEW: Final = "view.html"
+"""The page with the machine, in the folder of an evaluation."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class EvaluateCommand:
     """Drive maneuvers with policies, and say which policy is better, by how much, and why.
@@ -56,6 +60,8 @@ class EvaluateCommand:
     scale: ScaleText = "1"
     figures: bool = False
     """Draw figures for print as well, in PDF and PNG: one a maneuver, and the benchmark."""
+    view: bool = False
+    """Write view.html as well, the machine in three dimensions, to which the report links from each drive."""
     out: OutFolder = Path("results")
 
 
@@ -82,6 +88,7 @@ class Plan:
         skipped: Policies of the benchmark that cannot be driven here, and why; what is left out of a replay.
         feel: Whether the tables of what people feel are shown and written.
         figures: Whether figures for print are drawn.
+        view: Whether the page with the machine is written.
     """
 
     maneuvers: Mapping[str, CueSource]
@@ -94,20 +101,21 @@ class Plan:
     skipped: Mapping[str, str] = field(default_factory=dict)
     feel: bool = False
     figures: bool = False
+    view: bool = False
 
 
 @dataclass(eq=False)
-class _Output:
+class Output:
     """Writes what belongs to one maneuver as soon as it is driven; keeps what the report plots.
 
     Maneuvers and policies are labels with their part of a file name.
     """
 
-    folder: Path
+    plan: Plan
     maneuvers: Mapping[str, str]
     policies: Mapping[str, str]
-    figures: bool
     packed: dict[str, PackedDrive] = field(default_factory=dict)
+    viewed: dict[str, PackedDrive] = field(default_factory=dict)
 
     def finish(self, maneuver: str, drives: Mapping[str, Trajectory]) -> None:
         """Save the trajectories of a maneuver, and its figure where figures are drawn."""
@@ -115,12 +123,18 @@ class _Output:
 
         for policy, drive in drives.items():
             name = f"{self.maneuvers[maneuver]}--{self.policies[policy]}.npz"
-            drive.save(self.folder / "trajectories" / name)
+            drive.save(self.plan.out / "trajectories" / name)
         self.packed[maneuver] = pack(drives)
-        if self.figures:
+        if self.plan.view:
+            from ..evaluation.reporting.view import pack_view
+
+            self.viewed[maneuver] = pack_view(drives, self.plan.maneuvers[maneuver]())
+        if self.plan.figures:
             from ..evaluation.reporting.figures import maneuver_figure, save_figure
 
-            save_figure(maneuver_figure(drives, list(self.policies)), self.folder / self.maneuvers[maneuver])
+            save_figure(
+                maneuver_figure(drives, list(self.policies)), self.plan.out / self.maneuvers[maneuver]
+            )
 
 
 def run(command: EvaluateCommand) -> int:
@@ -150,8 +164,8 @@ def report(plan: Plan, ranked: bool) -> int:
     from ..evaluation.reporting.tables import feel_tables, print_results
     from ..evaluation.reporting.text import print_table, save_markdown, table_console
 
-    results, drives = evaluate(plan)
-    save(results, drives, plan.out, plan.figures)
+    results, output = evaluate(plan)
+    save(results, output)
     if plan.feel:
         save_markdown(plan.out / "feel.md", *feel_tables(results))
     console = table_console()
@@ -201,6 +215,7 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         skipped=skipped,
         feel="feel" in command.metrics,
         figures=command.figures,
+        view=command.view,
     )
 
 
@@ -210,15 +225,15 @@ def _drive(policy: Any, platform: Platform, car: Car, cues: CueTrace) -> Traject
     return rollout(policy, cues, platform=platform, car=car)
 
 
-def evaluate(plan: Plan) -> tuple[Results, dict[str, PackedDrive]]:
-    """Drive and measure everything; drives for the report come beside the results, by maneuver."""
+def evaluate(plan: Plan) -> tuple[Results, Output]:
+    """Drive and measure everything; what the report plots comes beside the results."""
     from ..evaluation.reporting.text import file_names
     from ..evaluation.suite import run_suite
 
-    output = _Output(plan.out, file_names(plan.maneuvers), file_names(plan.policies), plan.figures)
+    output = Output(plan, file_names(plan.maneuvers), file_names(plan.policies))
     with drives_progress(len(plan.maneuvers) * (len(plan.policies) + 1)) as advance:
         outcome = run_suite(plan.maneuvers, plan.policies, output.finish, advance, costly=plan.feel)
-    return collect(plan, outcome), output.packed
+    return collect(plan, outcome), output
 
 
 def collect(plan: Plan, outcome: Outcome) -> Results:
@@ -229,18 +244,24 @@ def collect(plan: Plan, outcome: Outcome) -> Results:
     return Results.of(outcome.maneuvers, outcome.failures, origin, skipped=plan.skipped, notes=outcome.notes)
 
 
-def save(results: Results, drives: Mapping[str, PackedDrive], folder: Path, figures: bool = False) -> None:
-    """Write results.json, results.csv, the benchmark and report.html into a folder."""
+def save(results: Results, output: Output) -> None:
+    """Write results.json, results.csv, the benchmark, report.html, and the view and figures if wanted."""
     from ..evaluation.benchmark.table import save_benchmark
     from ..evaluation.reporting.report import save_report
+    from ..evaluation.reporting.view import save_view
 
+    plan, folder = output.plan, output.plan.out
     results.save_json(folder / "results.json")
     results.save_csv(folder / "results.csv")
     if len(results.scores) > 1:
         save_benchmark(results, folder)
-    if figures:
+    if plan.figures:
         from ..evaluation.reporting.figures import benchmark_figure, save_figure
 
         if (figure := benchmark_figure(results)) is not None:
             save_figure(figure, folder / "benchmark")
-    save_report(results, folder / "report.html", drives)
+    if output.viewed:
+        save_view(
+            output.viewed, plan.platform, folder / VIEW, f"Drives on the motion base {plan.platform.name}"
+        )
+    save_report(results, folder / "report.html", output.packed, VIEW if output.viewed else "")

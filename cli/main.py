@@ -102,6 +102,13 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "--maneuver slalom --policy learned --out slalom.gif",
         "`motion-cueing evaluate` says how good the drive is",
     ),
+    "view": Command(
+        ".view",
+        "ViewCommand",
+        "show a drive in three dimensions, in a browser",
+        "classical-tuned learned --maneuver slalom --out slalom.html",
+        "open the page; `motion-cueing evaluate --view` writes one beside its report",
+    ),
     "export": Command(
         ".export",
         "ExportCommand",

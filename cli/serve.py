@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -100,6 +100,11 @@ class ServeCommand:
     """Core to run on alone."""
     priority: Whole | None = None
     """Real-time priority (SCHED_FIFO), 1 to 99; needs the right to it."""
+    view: bool = False
+    """Show the machine in a browser at 30 frames a second: a page on this machine, from a process of its
+    own."""
+    view_port: Whole = 0
+    """Port of that page; 0 for any that is free."""
     log: Annotated[Path | None, option("FILE.npz")] = None
     """Trajectory to write, a new file, for `motion-cueing evaluate --replays`."""
     report: Annotated[Path | None, option("FILE.json")] = None
@@ -161,11 +166,27 @@ def run(command: ServeCommand) -> int:
     print(
         f"making {command.policy} for {command.platform}; it takes some seconds", file=sys.stderr, flush=True
     )
+    with ExitStack() as stack:
+        with compilation_announced():
+            served = _made(command)
+        receivers: list[tuple[Any, Address]] = [*served.outputs]
+        if command.view:
+            from ..realtime.view import ViewFeed, watched
+
+            address, url = stack.enter_context(
+                watched(served.platform, command.policy, command.view_port, command.cpu)
+            )
+            receivers.append((ViewFeed(served.machine, command.rate), address))
+            print(f"view: {url}")
+        _serve(command, served, receivers)
+    return 0
+
+
+def _serve(command: ServeCommand, served: _Served, receivers: list[tuple[Any, Address]]) -> None:
+    """Serve, and write what happened."""
     from ..realtime.packets import make_format
     from ..realtime.server import Endpoint, Server, address_of
 
-    with compilation_announced():
-        served = _made(command)
     endpoint = Endpoint(address_of(command.host, command.port))
     try:
         server = Server(
@@ -174,13 +195,12 @@ def run(command: ServeCommand) -> int:
             make_format(command.format),
             command.rate,
             command.lead,
-            outputs=served.outputs,
+            outputs=receivers,
         )
         _run(command, server, endpoint)
     finally:
         endpoint.close()
     _finish(command, served, server, endpoint)
-    return 0
 
 
 def _check(command: ServeCommand) -> None:

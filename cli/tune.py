@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 _LINES: Final = 20
 """Lines in all where the output is no terminal."""
+_BY_HAND: Final = "double-lane-change"
+"""What is driven while a washout is tuned by hand, if nothing else is named."""
 _SUCCESS: Final = 0
 _INTERRUPTED: Final = 130
 _MADE_BY: Final = "Made by: "
@@ -47,6 +49,8 @@ _ELSE: Final = "leave it out, name another --out, or add --fresh to begin anew"
 @dataclass(frozen=True, kw_only=True)
 class TuneCommand:
     """Search for the parameters with which a washout is at its best on random drives or named maneuvers.
+
+    With --live it is tuned by hand.
 
     Writes a policy for `motion-cueing evaluate --policies FILE`. Ctrl-C stops after the generation at hand;
     the same command goes on from the search kept beside --out, and another --hours makes it longer.
@@ -81,6 +85,11 @@ class TuneCommand:
     """Policy to write; its name is that of the file. The search is kept beside it, as FILE.search.json;
     default: my-classical.yaml and so on."""
     fresh: Fresh = False
+    live: bool = False
+    """Tune by hand instead: a page on this machine with a slider for each parameter, and the first of the
+    --maneuvers, default: double-lane-change, driven again at each change."""
+    port: Whole = 0
+    """Port on this machine for the page; 0 for any that is free."""
 
 
 def run(command: TuneCommand) -> int:
@@ -91,6 +100,8 @@ def run(command: TuneCommand) -> int:
     FAMILIES[command.algorithm]  # refuses an unknown one
     command = replace(command, out=_out(command))
     _check(command)
+    if command.live:
+        return _tune_by_hand(command)
     goes_on = _kept(command).exists() and not command.fresh
     record = _begun(command) if goes_on else _new(command)
     search = _search(record, command, goes_on)
@@ -107,6 +118,34 @@ def run(command: TuneCommand) -> int:
     if status.hours < search.options.budget:
         print(f"nothing better to be found after {status.hours:.3g} h", file=sys.stderr)
     return _SUCCESS
+
+
+def _tune_by_hand(command: TuneCommand) -> int:
+    """Serve the page until Ctrl-C."""
+    from ..baselines.tuning.search import TRAIN
+    from ..envs.settings import to_dict
+    from ..evaluation.reporting.view.server import PageServer, Routes
+    from ..evaluation.reporting.view.tuning import HandTuning
+    from .view import serve
+
+    options, out = _options(command), _out(command)
+    if TRAIN in command.maneuvers:
+        options = replace(options, maneuvers=(_BY_HAND,))
+    tuning = HandTuning(
+        options.start, _drives(options, find_car(command.car)), find_platform(command.platform)
+    )
+
+    def save(request: Any) -> dict[str, str]:
+        values = to_dict(tuning.parameters(request["places"])) | {"name": out.stem}
+        _check_out(out)
+        write_text(out, f"# {_MADE_BY}motion-cueing tune --live\n" + yaml.safe_dump(values, sort_keys=False))
+        return {"saved": str(out)}
+
+    import yaml
+
+    page = tuning.render(str(out))
+    routes = Routes(lambda: page, {"/replay": tuning.replay, "/save": save})
+    return serve(PageServer(routes, command.port), browser=False)
 
 
 class SearchProgress:

@@ -20,13 +20,12 @@ import select
 import socket
 import time
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from ..envs.errors import ConfigurationError
 from .controller import Controller
 from .inbox import Address
-from .outputs import Output
-from .packets import LARGEST, NO_SEQUENCE, Format
+from .packets import LARGEST, NO_SEQUENCE, Format, SetPoint
 from .timing import Histogram, Pace
 
 _SPIN: Final = 100_000
@@ -136,6 +135,19 @@ def is_loopback(address: Address) -> bool:
     return ipaddress.ip_address(address[0]).is_loopback
 
 
+class Receiver(Protocol):
+    """Writes set-points for another receiver, as :class:`~.outputs.Output` does."""
+
+    @property
+    def every(self) -> int:
+        """Set-points from one datagram to the next."""
+        ...
+
+    def datagram(self, setpoint: SetPoint) -> bytes:
+        """The datagram of a set-point."""
+        ...
+
+
 class Server:
     """Runs a controller at absolute deadlines.
 
@@ -162,7 +174,7 @@ class Server:
         rate: int,
         lead: float,
         clock: Callable[[], int] = time.perf_counter_ns,
-        outputs: Sequence[tuple[Output, Address]] = (),
+        outputs: Sequence[tuple[Receiver, Address]] = (),
     ) -> None:
         self._outputs = outputs
         self._controller, self._endpoint, self._form, self._rate = controller, endpoint, form, rate

@@ -52,8 +52,12 @@ class PackedDrive:
         return {**self.about, "data": base64.b64encode(self.data).decode("ascii")}
 
 
-class _Packer:
-    """Gathers arrays; the same array is packed once."""
+class Packer:
+    """Gathers arrays; the same array is packed once.
+
+    Attributes:
+        arrays: About each array, as a page must know it.
+    """
 
     def __init__(self) -> None:
         self.arrays: list[dict[str, Any]] = []
@@ -93,6 +97,7 @@ class _Packer:
         return self._known[key]
 
     def compressed(self) -> bytes:
+        """All arrays, deflated."""
         return zlib.compress(b"".join(self.planes), 6)
 
 
@@ -104,7 +109,7 @@ def pack(drives: Drives, criteria: Criteria | None = None) -> PackedDrive:
         criteria: Thresholds to show.
     """
     criteria = criteria or Criteria()
-    packer = _Packer()
+    packer = Packer()
     policies: dict[str, Any] = {}
     for name, drive in drives.items():
         worst = worst_second(drive, criteria)
@@ -142,7 +147,7 @@ def pack(drives: Drives, criteria: Criteria | None = None) -> PackedDrive:
     return PackedDrive(about, packer.compressed())
 
 
-def _add(packer: _Packer, panel: Panel, values: Floats) -> list[int]:
+def _add(packer: Packer, panel: Panel, values: Floats) -> list[int]:
     """Numbers of the arrays of a panel: one, or two of a band."""
     resolution = _LOGARITHM if panel.logarithmic else 1.0 if panel.levels else _RESOLUTION * panel.least
     columns: Sequence[Floats] = [values] if values.ndim == 1 else list(values.T)

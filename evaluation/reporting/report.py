@@ -9,23 +9,21 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import json
 import re
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 import yaml
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ...envs.settings import to_dict
 from ...envs.storage import write_text
 from ..benchmark.table import benchmark_table
 from ..metrics import METRICS, ActuatorMetrics, AxisMetrics, Criteria, Metrics, References, declared, mean
 from ..results import Results
+from .html import assets, script_json, template
 from .packing import MISSING, PackedDrive
 from .signals import PANELS, PHASES, in_order, looks, shown_at_first
 from .summary import chart, sentences, summarize
@@ -41,29 +39,25 @@ from .tables import (
 )
 from .text import NOTHING, TextTable, fraction, markdown, microseconds, number
 
+_PLOTTING: Final = ("page/uPlot.iife.min.js", "page/unpack.js")
 _DARKEST: Final = 0.35
 """Opacity of the best cell of a row."""
 
 
-def render(results: Results, drives: Mapping[str, PackedDrive] = MappingProxyType({})) -> str:
+def render(results: Results, drives: Mapping[str, PackedDrive] = MappingProxyType({}), view: str = "") -> str:
     """The page.
 
     Args:
         results: What to report.
         drives: Drives to plot, by maneuver, as far as there are any.
+        view: Name of the page with the machine beside the report, to which each drive links; "" for none.
     """
-    environment = Environment(
-        loader=PackageLoader("motion_cueing.evaluation.reporting", "page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     configuration = {"criteria": to_dict(results.criteria), **results.provenance.configuration}
     packed = {name: drives[name] for name in results.maneuvers if name in drives}
     summaries = summarize(results)
-    return environment.get_template("report.html").render(
+    return template("page/report.html").render(
         results=results,
+        view=view,
         definitions={name: METRICS[name].definition for name in ("cue_error", "perceived_cue_error")},
         summaries=summaries,
         sentences=sentences(summaries, max((s.maneuvers for s in results.scores), default=0)),
@@ -80,28 +74,21 @@ def render(results: Results, drives: Mapping[str, PackedDrive] = MappingProxyTyp
         number=number,
         fraction=fraction,
         microseconds=microseconds,
-        styles="\n".join(map(_asset, ("uPlot.min.css", "report.css"))),
-        scripts="\n".join(map(_asset, ("uPlot.iife.min.js", "report.js"))) if packed else _asset("report.js"),
-        about=_json(_about(results, packed)),
-        packed=[_json(drive.content) for drive in packed.values()],
+        styles=assets("page/uPlot.min.css", "page/report.css"),
+        scripts=assets(*(_PLOTTING if packed else ()), "page/report.js"),
+        about=script_json(_about(results, packed)),
+        packed=[script_json(drive.content) for drive in packed.values()],
     )
 
 
 def save_report(
-    results: Results, path: str | Path, drives: Mapping[str, PackedDrive] = MappingProxyType({})
+    results: Results,
+    path: str | Path,
+    drives: Mapping[str, PackedDrive] = MappingProxyType({}),
+    view: str = "",
 ) -> None:
     """Write the page, whole or not at all."""
-    write_text(path, render(results, drives))
-
-
-def _asset(name: str) -> str:
-    return files("motion_cueing.evaluation.reporting.page").joinpath(name).read_text(encoding="utf-8")
-
-
-def _json(content: Any) -> str:
-    """JSON that may stand in a script: no name in it can end the script."""
-    text = json.dumps(content, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    write_text(path, render(results, drives, view))
 
 
 def _about(results: Results, packed: Mapping[str, PackedDrive]) -> dict[str, Any]:

@@ -54,23 +54,7 @@
   /* ---- packed drives ---- */
 
   async function unpack(content) {
-    const bytes = Uint8Array.from(atob(content.data), (c) => c.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const raw = new Uint8Array(await new Response(stream).arrayBuffer());
-    let begin = 0;
-    const arrays = content.arrays.map(({ n, planes, step, log, missing }) => {
-      const out = missing ? new Array(n) : new Float64Array(n);
-      let whole = 0, slope = 0;
-      for (let k = 0; k < n; k++) {
-        let folded = 0;
-        for (let p = planes - 1; p >= 0; p--) folded = folded * 256 + raw[begin + p * n + k];
-        slope += folded % 2 ? -(folded + 1) / 2 : folded / 2;
-        whole += slope;
-        out[k] = missing && whole === about.missing ? null : log ? Math.pow(2, whole * step) : whole * step;
-      }
-      begin += n * planes;
-      return out;
-    });
+    const arrays = await unpackArrays(content, about.missing);
     const of = ({ time, panels }) => ({
       time: arrays[time],
       panels: Object.fromEntries(Object.entries(panels).map(([name, list]) => [name, list.map((i) => arrays[i])])),

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,10 +11,10 @@ from motion_cueing.evaluation.reporting.report import save_report
 from motion_cueing.evaluation.reporting.signals import PANELS, worst_second
 from motion_cueing.evaluation.results import Results
 
+from ...browser import chromium
 from ..examples import GAINS, ORIGIN
 from ..synthetic import GRAVITY, drive, trajectory
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytestmark = pytest.mark.slow
 
 MARKUP = "<img src=x onerror=\"document.title='broken'\">"
@@ -42,14 +39,8 @@ DRIVES = {
 
 @pytest.fixture(scope="module")
 def browser():
-    """Chromium, the one of the system if there is one."""
-    with playwright.sync_playwright() as driver:
-        path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-        if path is None and not Path(driver.chromium.executable_path).exists():
-            pytest.skip("no browser found; install Chromium, or run `playwright install chromium`")
-        started = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+    with chromium() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
