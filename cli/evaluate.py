@@ -16,6 +16,7 @@ from .arguments import (
     ALL,
     BENCHMARK,
     CarName,
+    Compensate,
     ManeuverNames,
     OutFolder,
     PlatformName,
@@ -54,6 +55,7 @@ class EvaluateCommand:
     suite: Literal[1, 2] = 1
     """Version of the standard maneuvers that `all` stands for."""
     scale: ScaleText = "1"
+    compensate: Compensate = False
     figures: bool = False
     """Draw figures for print as well, in PDF and PNG: one a maneuver, and the benchmark."""
     out: OutFolder = Path("results")
@@ -185,7 +187,9 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     recorded, skipped = load_drives(command.replays, platform)
     drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
     if command.policies or not recorded:
-        policies, missing = arguments.make_policies(command.policies, platform)
+        policies, missing = arguments.make_policies(
+            command.policies, platform, partial(arguments.make_policy, compensate=command.compensate)
+        )
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
