@@ -26,6 +26,16 @@ _AHEAD: Final = ("preview", "drive")
 """Kinds of information with true cues ahead."""
 
 
+_KEPT: Final = (
+    "setpoint",
+    "setpoint_acceleration",
+    "simulator_cue",
+    "vestibular_simulator",
+    "perceived_simulator",
+)
+"""Of the state of a late machine, where an ideal one begins in mid-drive."""
+
+
 class Compensated(Wrapper):
     """The policy with its machine's lag and dead time compensated.
 
@@ -154,15 +164,21 @@ class LateMachines(Interface):
     def begin(self, start: ArrayLike | None) -> None:
         """Begin all drives; from where the set-points are, the ideal machines begin there."""
         if start is None:
-            late, model = self.simulator, self._model.simulator
-            state = np.array(late.state)
-            state["motion"], state["acceleration"] = state["setpoint"], state["setpoint_acceleration"]
-            placed = {**model.snapshot(), "state": state.view(np.uint8).reshape(-1)}
-            model.restore(placed)
+            self._place_model()
         else:
             self.simulator.reset(start)
         self._model.begin(start)
         self._lead.begin(self._model.simulator.state)
+
+    def _place_model(self) -> None:
+        """Put the ideal machines where the set-points of the late ones are, at the same samples."""
+        model, late = self._model.simulator, self.simulator.state
+        ends = np.array([len(drive) - 1 for drive in model.drives])[model.drive_of]
+        state = np.array(model.reset(sample=np.minimum(late["sample"], ends)))
+        for name in _KEPT:
+            state[name] = late[name]
+        state["motion"], state["acceleration"] = late["setpoint"], late["setpoint_acceleration"]
+        model.restore({**model.snapshot(), "state": state.view(np.uint8).reshape(-1)})
 
     def observe(self) -> Array:
         """(n, size) what the policy sees of the ideal machines."""
