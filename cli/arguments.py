@@ -204,9 +204,7 @@ def find_policies(names: Sequence[str], platform: Platform) -> dict[str, str]:
 
 
 def make_policies(
-    names: Sequence[str],
-    platform: Platform,
-    make: Callable[[str, Platform], Any] | None = None,
+    names: Sequence[str], platform: Platform, make: Callable[[str, Platform], Any] | None = None
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Policies by label, and the reasons why policies of the benchmark are skipped on this machine.
 
@@ -238,10 +236,13 @@ def make_policy(name: str, platform: Platform, compensate: bool = False) -> Any:
         platform: The machine.
         compensate: Whether its lag and dead time are compensated.
     """
-    from ..baselines.compensation import CompensationOptions
     from ..evaluation import policies
 
-    return policies.make_policy(name, platform, compensation=CompensationOptions() if compensate else None)
+    if not compensate:
+        return policies.make_policy(name, platform)
+    from ..baselines.compensation import CompensationOptions
+
+    return policies.make_policy(name, platform, compensation=CompensationOptions())
 
 
 def known_lateness(compensate: bool, error: float) -> tuple[float, ...]:

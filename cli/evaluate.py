@@ -187,9 +187,8 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     recorded, skipped = load_drives(command.replays, platform)
     drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
     if command.policies or not recorded:
-        policies, missing = arguments.make_policies(
-            command.policies, platform, partial(arguments.make_policy, compensate=command.compensate)
-        )
+        make = partial(arguments.make_policy, compensate=True) if command.compensate else None
+        policies, missing = arguments.make_policies(command.policies, platform, make)
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(
