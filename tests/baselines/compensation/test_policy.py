@@ -50,7 +50,9 @@ def test_with_preview_a_pure_dead_time_is_made_good():
     ideal = rollout(agent, ahead, PAPER)
     compensated = rollout(Compensated(agent, NO_LEAD).for_platform(late), CUES, late)
     moved, expected = setpoints(compensated)[known], setpoints(ideal)
-    np.testing.assert_allclose(moved, expected, atol=1e-12)
+    # The ideal machine's legs are a hair slower, which the agent sees in its rows.
+    np.testing.assert_allclose(moved, expected, atol=2e-4)
+    assert np.abs(expected).max() > 0.1
     np.testing.assert_array_equal(compensated.f_reference, rollout(agent, CUES, PAPER).f_reference)
 
 
