@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
@@ -73,6 +73,16 @@ class Observer:
         return np.array(self._out.numpy())
 
 
+class CueFilter(Protocol):
+    """What is shown of a car's cues, each (6,): specific force, m/s^2, and angular velocity, rad/s."""
+
+    def begin(self, cues: Floats) -> None:
+        """Cues were as now for ever."""
+
+    def put(self, cues: Floats) -> Floats:
+        """What is shown at the next time step, from the cues there."""
+
+
 @dataclass(frozen=True)
 class Live:
     """A simulator whose drive may be written while it goes on.
@@ -81,10 +91,12 @@ class Live:
         simulator: With the drive's samples.
         memories: Low-passed cues of each sample, with the time constants of the low-passes, s, for each
             observation that holds some: the policy's, and that of the base policy under it.
+        shown: From the car's cues to those that are written; None where they are the same.
     """
 
     simulator: Simulator
     memories: tuple[tuple[Mirror, tuple[float, ...]], ...] = ()
+    shown: CueFilter | None = None
 
 
 class Interface(ABC):
@@ -239,17 +251,27 @@ class TaskInterface(Interface):
         ours, theirs = self.batch, leader.batch
         pairs = zip(vars(theirs.arrays).values(), vars(ours.arrays).values(), strict=True)
         arrays = [(_bytes_of(source.view), _bytes_of(target.view)) for source, target in pairs]
-        sources, targets = _states_of(theirs.simulator), _states_of(ours.simulator)
+        copy_state = state_copier(theirs.simulator, ours.simulator)
 
         def copy() -> None:
             for source, target in arrays:
                 target[...] = source
-            held = zip(sources[theirs.simulator.current], targets[ours.simulator.current], strict=True)
-            for source, target in held:
-                target[...] = source
+            copy_state()
             ours.base.restore(theirs.base.snapshot())
 
         return copy
+
+
+def state_copier(leader: Simulator, follower: Simulator) -> Callable[[], None]:
+    """What brings a simulator to the state of another that was made alike, fast enough for real time."""
+    sources, targets = _states_of(leader), _states_of(follower)
+
+    def copy() -> None:
+        held = zip(sources[leader.current], targets[follower.current], strict=True)
+        for source, target in held:
+            target[...] = source
+
+    return copy
 
 
 def _states_of(simulator: Simulator) -> list[tuple[NDArray[np.uint8], ...]]:

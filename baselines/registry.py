@@ -29,6 +29,7 @@ from ..envs.settings import preset_names
 
 if TYPE_CHECKING:
     from ..envs.platform.machines import Platform
+    from .compensation import CompensationOptions
     from .policy import Policy
 
 Factory: TypeAlias = "Callable[[Platform], Any]"
@@ -63,7 +64,13 @@ def default_policies() -> list[str]:
     return list(_DEFAULT)
 
 
-def make_policy(name: Any, platform: Platform, *, force: bool = False) -> Policy:
+def make_policy(
+    name: Any,
+    platform: Platform,
+    *,
+    force: bool = False,
+    compensation: CompensationOptions | None = None,
+) -> Policy:
     """A policy for a machine, by name or from a file; or a policy itself, fitted to the machine.
 
     Args:
@@ -72,6 +79,7 @@ def make_policy(name: Any, platform: Platform, *, force: bool = False) -> Policy
             ``file.py:Class``; or any object that :func:`~.policy.as_policy` takes.
         platform: The machine.
         force: Whether a policy that was made for another machine is put on this one as well as it can be.
+        compensation: How the machine's lag and dead time are compensated; None for not at all.
 
     Raises:
         UnknownNameError: no policy has this name.
@@ -82,6 +90,10 @@ def make_policy(name: Any, platform: Platform, *, force: bool = False) -> Policy
     from .policy import as_policy
 
     policy = as_policy(_made(name, platform))
+    if compensation is not None:
+        from .compensation import Compensated
+
+        policy = Compensated(policy, compensation)
     return policy.on(platform) if force else policy.for_platform(platform)
 
 

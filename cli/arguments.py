@@ -123,6 +123,13 @@ OutFolder = Annotated[Path, option("DIR", help="Folder for everything that is wr
 Workers = Annotated[
     int, option("N", converter=whole_number, help="Processes or threads that work at a time.")
 ]
+Compensate = Annotated[
+    bool,
+    Parameter(
+        help="Let policies know the machine's lag and dead time, and compensate them: "
+        "cues are taken earlier, or predicted."
+    ),
+]
 Fresh = Annotated[bool, Parameter(help="Begin anew instead of going on from what is in --out.")]
 
 
@@ -221,11 +228,34 @@ def make_policies(
     return policies, skipped
 
 
-def make_policy(name: str, platform: Platform) -> Any:
-    """A policy for a machine, by name, by file, or by reference to a class."""
+def make_policy(name: str, platform: Platform, compensate: bool = False) -> Any:
+    """A policy for a machine, by name, by file, or by reference to a class.
+
+    Args:
+        name: Of the policy.
+        platform: The machine.
+        compensate: Whether its lag and dead time are compensated.
+    """
     from ..evaluation import policies
 
-    return policies.make_policy(name, platform)
+    if not compensate:
+        return policies.make_policy(name, platform)
+    from ..baselines.compensation import CompensationOptions
+
+    return policies.make_policy(name, platform, compensation=CompensationOptions())
+
+
+def known_lateness(compensate: bool, error: float) -> tuple[float, ...]:
+    """Lateness over the true one that policies of a study are given: none, the true one, and wrong ones.
+
+    Raises:
+        ConfigurationError: the error is not within 0 and 1, or nothing is compensated.
+    """
+    if not 0.0 <= error < 1.0:
+        raise ConfigurationError(f"--lateness-error must be at least 0 and below 1, found {error:g}")
+    if not compensate:
+        return ()
+    return (1.0, 1.0 - error, 1.0 + error) if error else (1.0,)
 
 
 def find_maneuvers(names: Sequence[str], car: Car, suite: int = 1) -> dict[str, CueSource]:

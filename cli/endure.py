@@ -13,6 +13,7 @@ from ..envs.errors import ConfigurationError
 from ..envs.progress import progress
 from ..envs.storage import check_folder, check_own_json
 from .arguments import (
+    Compensate,
     Fresh,
     OutFolder,
     PlatformName,
@@ -20,6 +21,7 @@ from .arguments import (
     Whole,
     find_platform,
     find_policies,
+    known_lateness,
     option,
     several,
 )
@@ -61,6 +63,10 @@ class EndureCommand:
     """Range of the natural frequency of the actuators' lag, rad/s."""
     dead_time: Annotated[tuple[float, float], option("LOW HIGH")] = (0.0, 0.05)
     """Range of the actuators' dead time, s."""
+    compensate: Compensate = False
+    lateness_error: float = 0.3
+    """With --compensate, policies are also given a lateness that is wrong by this share; 0 for the true one
+    alone."""
     envs: Whole = 256
     """Drives side by side."""
     out: OutFolder = Path("endurance")
@@ -112,6 +118,7 @@ def _endurance(command: EndureCommand) -> Endurance:
         friction=command.friction,
         natural_frequency=command.lag,
         dead_time=command.dead_time,
+        known=known_lateness(command.compensate, command.lateness_error),
     )
 
 

@@ -16,6 +16,7 @@ from .arguments import (
     ALL,
     BENCHMARK,
     CarName,
+    Compensate,
     ManeuverNames,
     OutFolder,
     PlatformName,
@@ -58,6 +59,7 @@ class EvaluateCommand:
     suite: Literal[1, 2] = 1
     """Version of the standard maneuvers that `all` stands for."""
     scale: ScaleText = "1"
+    compensate: Compensate = False
     figures: bool = False
     """Draw figures for print as well, in PDF and PNG: one a maneuver, and the benchmark."""
     view: bool = False
@@ -199,7 +201,8 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
     recorded, skipped = load_drives(command.replays, platform)
     drives: dict[str, Drive] = {DRIVEN: lambda cues: recorded[cues.name]} if recorded else {}
     if command.policies or not recorded:
-        policies, missing = arguments.make_policies(command.policies, platform)
+        make = partial(arguments.make_policy, compensate=True) if command.compensate else None
+        policies, missing = arguments.make_policies(command.policies, platform, make)
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
     return Plan(

@@ -95,6 +95,14 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "--out cues.csv",
         "`motion-cueing evaluate --maneuvers cues.csv` drives it",
     ),
+    "identify": Command(
+        ".identify",
+        "IdentifyCommand",
+        "find a motion base's lag and dead time in a log of its motion",
+        "motion.csv --platform paper --out my-platform.yaml",
+        "`motion-cueing evaluate --platform my-platform.yaml --compensate` drives it",
+        announces=False,
+    ),
     "render": Command(
         ".render",
         "RenderCommand",

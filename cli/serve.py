@@ -18,6 +18,7 @@ from ..envs.storage import check_file
 from . import arguments
 from .arguments import (
     CarName,
+    Compensate,
     ManeuverName,
     Name,
     PlatformName,
@@ -56,6 +57,7 @@ class ServeCommand:
     """Set-points a second, a multiple of 100; the policy acts 100 times a second."""
     platform: PlatformName = "paper"
     scale: ScaleText = "1"
+    compensate: Compensate = False
     host: str = "127.0.0.1"
     """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
     port: Whole = DEFAULT_PORT
@@ -244,7 +246,7 @@ def _made(command: ServeCommand) -> _Served:
     platform = arguments.find_platform(command.platform)
     written = [load_output(file, platform, command.rate) for file in command.output]
     outputs = [(output, address_of(output.template.to, 0)) for output in written]
-    policy = arguments.make_policy(command.policy, platform)
+    policy = arguments.make_policy(command.policy, platform, command.compensate)
     machine = make_machine(policy, platform, _VESTIBULAR)
     return _Served(policy, platform, machine, Controller(machine, platform, inbox, options), outputs)
 

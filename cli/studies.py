@@ -15,6 +15,7 @@ from .arguments import (
     ALL,
     BENCHMARK,
     CarName,
+    Compensate,
     Fresh,
     ManeuverNames,
     Name,
@@ -27,6 +28,7 @@ from .arguments import (
     find_platform,
     find_platforms,
     find_policies,
+    known_lateness,
     several,
 )
 
@@ -86,6 +88,12 @@ class RobustnessCommand:
     """Standard deviation of the noise on angular velocities, deg/s."""
     time_scaling: float = 2.0
     """Factor on all accelerations of the drives."""
+    compensate: Compensate = False
+    """Drive with lag and dead time at once as well: uncompensated, compensated, and with a lateness that is
+    wrong."""
+    lateness_error: float = 0.3
+    """With --compensate, policies are also given a lateness that is wrong by this share; 0 for the true one
+    alone."""
     out: OutFolder = Path("robustness")
     fresh: Fresh = False
 
@@ -172,6 +180,7 @@ def make_study(command: RobustnessCommand) -> Study:
             dead_time=command.dead_time,
             noise=SensorNoise(force=command.force_noise, rate=math.radians(command.rate_noise)),
             time_scaling=command.time_scaling,
+            known=known_lateness(command.compensate, command.lateness_error),
         ),
     )
 

@@ -146,7 +146,9 @@ class Rollout:
             )
         drives = machines.drives
         if acting.needs_drive:
-            self.policies = [acting.for_drive(drive) for drive in drives]
+            of = np.zeros(len(drives), dtype=int) if machines.platform_of is None else machines.platform_of
+            pairs = zip(drives, np.asarray(of), strict=True)
+            self.policies = [acting.on(machines.platforms[k]).for_drive(drive) for drive, k in pairs]
         elif alone:
             # A copy each: what a policy counts belongs to its drive.
             self.policies = [copy.copy(acting) for _ in drives]

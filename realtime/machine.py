@@ -52,6 +52,7 @@ class LiveCues:
 
     def __init__(self, live: Live) -> None:
         drives = live.simulator.constants[2]
+        self._shown, self._newest = live.shown, AT_REST
         self._simulator = live.simulator
         self._rows = [drives.force.numpy(), drives.rate.numpy(), drives.rate_derivative.numpy()]
         # Views that are made once: each step of a millisecond counts.
@@ -70,6 +71,9 @@ class LiveCues:
 
     def put(self, cues: Floats) -> None:
         """Move on by a time step, with the newest cues (6,): force, m/s^2, angular velocity, rad/s."""
+        if self._shown is not None:
+            self._newest = cues
+            cues = self._shown.put(cues)
         change = (cues[3:] - self._moves[1][2]) / TIME_STEP
         for (earlier, later, last), newest in zip(self._moves, (cues[:3], cues[3:], change), strict=True):
             earlier[...] = later
@@ -82,6 +86,11 @@ class LiveCues:
 
     def begin(self) -> None:
         """Take the car to have moved for ever as it moves now, as at the beginning of any drive."""
+        if self._shown is not None:
+            self._shown.begin(self._newest)
+            cues = self._shown.put(self._newest)
+            for (*_, last), written in zip(self._moves, (cues[:3], cues[3:], 0.0), strict=True):
+                last[...] = written
         for one in self._low_passes:
             one.begin(self._scaled())
 

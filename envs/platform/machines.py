@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ ACTUATORS = ("carriage_x", "carriage_y", "leg_1", "leg_2", "leg_3", "leg_4", "le
 
 AXES = ("carriage_x", "carriage_y", "surge", "sway", "heave", "roll", "pitch", "yaw", "turntable")
 """Names of the nine degrees of freedom an action commands, in its order."""
+
+SUBSYSTEMS: Final = ("carriage", "hexapod", "turntable")
+"""Parts of a machine whose actuators have a lag and a dead time each."""
 
 UNLIMITED: Final = 1e9
 """Travel of an unlimited turntable in the kernels, rad: finite, so that no infinity meets a zero."""
@@ -46,6 +49,12 @@ class ActuatorDynamics:
     natural_frequency: Positive | None = None
     damping: Annotated[float, Field(ge=1.0)] = 1.0
     dead_time: Annotated[float, Field(ge=0.0, le=LONGEST_DEAD_TIME)] = 0.0
+
+    @property
+    def lateness(self) -> float:
+        """Delay of slow motion, s: dead time + 2 zeta / omega."""
+        lag = 0.0 if self.natural_frequency is None else 2.0 * self.damping / self.natural_frequency
+        return self.dead_time + lag
 
 
 UNITY = ActuatorDynamics()
@@ -187,6 +196,27 @@ class Platform:
     turntable: Turntable | None = None
     cab: Cab = Cab()
     braking: Braking = Braking()
+
+    @property
+    def dynamics(self) -> dict[str, ActuatorDynamics]:
+        """Lag and dead time by the name of the subsystem, of those that the machine has."""
+        parts = {name: getattr(self, name) for name in SUBSYSTEMS}
+        return {name: part.dynamics for name, part in parts.items() if part is not None}
+
+    def with_dynamics(self, dynamics: ActuatorDynamics | Mapping[str, ActuatorDynamics]) -> Platform:
+        """The same machine with other lags and dead times.
+
+        Args:
+            dynamics: Of all actuators, or by the name of a subsystem; the others stay as they are. What the
+                machine does not have is passed over.
+        """
+        by_name = dynamics if isinstance(dynamics, Mapping) else dict.fromkeys(SUBSYSTEMS, dynamics)
+        parts: dict[str, Any] = {
+            name: replace(getattr(self, name), dynamics=by_name[name])
+            for name in self.dynamics
+            if name in by_name
+        }
+        return replace(self, **parts)
 
     def without_carriage(self) -> Platform:
         """The same machine with its carriage locked at 0."""

@@ -14,7 +14,7 @@ from ..arrays import mat63, mat65, vec3, vec6, vec9
 from .kernels.geometry import HexapodGeometry
 from .kernels.step import Machine
 from .kinematics import FAR_FROM_SINGULAR, braking_stays_clear, check_geometry, neutral_jacobian
-from .machines import ActuatorDynamics, Hexapod, Platform, limits_of
+from .machines import SUBSYSTEMS, UNITY, ActuatorDynamics, Hexapod, Platform, limits_of
 
 
 def geometry_of(hexapod: Hexapod) -> Any:
@@ -48,12 +48,7 @@ def dead_steps(platform: Platform, dt: float) -> list[int]:
 
 
 def _dynamics(platform: Platform) -> list[ActuatorDynamics]:
-    unity = ActuatorDynamics()
-    return [
-        platform.carriage.dynamics if platform.carriage else unity,
-        platform.hexapod.dynamics,
-        platform.turntable.dynamics if platform.turntable else unity,
-    ]
+    return [platform.dynamics.get(name, UNITY) for name in SUBSYSTEMS]
 
 
 _CORNERS: Final = np.array(list(product((-1.0, 1.0), repeat=6)))

@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -32,6 +33,12 @@ NOMINAL: Final = "nominal"
 SLOWER: Final = "slower"
 """Name of the condition with machines whose actuators have a lag and a dead time."""
 
+
+def compensated_name(known: float) -> str:
+    """Name of the condition with slower machines and policies that know this share of the true lateness."""
+    return "compensated" if known == 1.0 else f"compensated, known ×{known:g}"
+
+
 _EVENLY: Final[dict[str, Any]] = dict.fromkeys(ORDINARY_KINDS, 1.0)
 _EVERY_KIND: Final = RandomDrives(**_EVENLY, roughness=(0.0, 600.0), cars=STANDARD_CARS)
 
@@ -51,6 +58,8 @@ class Endurance:
         natural_frequency: Range of the actuators' lag, rad/s, drawn for each subsystem of a machine.
         dead_time: Range of their dead time, s, drawn alike.
         machines: Slower machines that drives draw from.
+        known: Lateness that policies are given on the slower machines and compensate, over the true one; each
+            is a condition of its own. None: policies know nothing of it.
     """
 
     drives: RandomDrives = _EVERY_KIND
@@ -59,6 +68,20 @@ class Endurance:
     natural_frequency: tuple[Positive, Positive] = (30.0, 90.0)
     dead_time: tuple[NonNegative, NonNegative] = (0.0, 0.05)
     machines: Annotated[int, Field(ge=1)] = 64
+    known: tuple[Positive, ...] = ()
+
+    @property
+    def conditions(self) -> dict[str, float | None]:
+        """Known lateness over the true one, by the name of a condition; None where it is unknown."""
+        compensated = {compensated_name(factor): factor for factor in self.known}
+        return {NOMINAL: None, SLOWER: None, **compensated}
+
+    def about(self) -> dict[str, Any]:
+        """What drives depend on, as plain values; as it was before there was compensation, without one."""
+        values: dict[str, Any] = to_dict(self)
+        if not self.known:
+            del values["known"]
+        return values
 
     def __post_init__(self) -> None:
         # The ranges are those of an environment, which checks them.
@@ -186,9 +209,10 @@ class EnduranceSummary:
         perceived_cue_error: Mean perceived J.
         slower_perceived_cue_error: The same on the slower ones.
         at_limit: Mean share of time with any actuator at any limit, by condition.
-        beyond: Samples beyond any limit, under both conditions.
+        beyond: Samples beyond any limit, under all conditions.
         exceeded: The same by kind of limit.
-        actions_not_finite: Under both conditions.
+        actions_not_finite: Under all conditions.
+        compensated: Mean J on the slower machines, by condition with a known lateness.
     """
 
     drives: int
@@ -203,6 +227,7 @@ class EnduranceSummary:
     beyond: int
     exceeded: dict[str, int]
     actions_not_finite: int
+    compensated: dict[str, float | None] = field(default_factory=dict)
 
     @property
     def ratio(self) -> float | None:
@@ -259,8 +284,9 @@ class EnduranceResults(Headed):
 
 def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSummary:
     """Drives in one; at least one."""
-    nominal, slower = ([drive.conditions[name] for drive in drives] for name in (NOMINAL, SLOWER))
-    both = [*nominal, *slower]
+    by_condition = {name: [drive.conditions[name] for drive in drives] for name in drives[0].conditions}
+    nominal, slower = by_condition[NOMINAL], by_condition[SLOWER]
+    every = [one for results in by_condition.values() for one in results]
     errors = [float("inf") if one.cue_error is None else one.cue_error for one in slower]
     worst = drives[errors.index(max(errors))]
     return EnduranceSummary(
@@ -274,11 +300,16 @@ def summarized(drives: Sequence[EnduredDrive], time_step: float) -> EnduranceSum
         slower_perceived_cue_error=_mean([one.perceived_cue_error for one in slower]),
         at_limit={
             name: sum(one.at_limit for one in results) / len(results)
-            for name, results in ((NOMINAL, nominal), (SLOWER, slower))
+            for name, results in by_condition.items()
         },
-        beyond=sum(one.beyond for one in both),
-        exceeded={kind: sum(one.exceeded[kind] for one in both) for kind in both[0].exceeded},
-        actions_not_finite=sum(one.actions_not_finite for one in both),
+        beyond=sum(one.beyond for one in every),
+        exceeded={kind: sum(one.exceeded[kind] for one in every) for kind in every[0].exceeded},
+        actions_not_finite=sum(one.actions_not_finite for one in every),
+        compensated={
+            name: _mean([one.cue_error for one in results])
+            for name, results in by_condition.items()
+            if name not in (NOMINAL, SLOWER)
+        },
     )
 
 
@@ -343,8 +374,9 @@ _ERRORS: Final = ("J", "J slower", "J ratio", "perceived J", "perceived ratio", 
 
 
 def tables(results: EnduranceResults) -> list[TextTable]:
-    """Safety, errors, and errors by kind of road, of every policy with a drive."""
-    return [_safety(results), _errors(results), _kinds(results)]
+    """Safety, errors, errors with compensation, and errors by kind of road, of every policy with a drive."""
+    compensated = [_compensated(results)] if results.endurance.known else []
+    return [_safety(results), _errors(results), *compensated, _kinds(results)]
 
 
 def _safety(results: EnduranceResults) -> TextTable:
@@ -354,7 +386,11 @@ def _safety(results: EnduranceResults) -> TextTable:
         extremes = list(results.policies[name].extremes.values())
         largest = [max(getattr(one, what) for one in extremes) for what in _SHARES]
         least = min(one.clearance for one in extremes)
-        cells = (f"{summary.hours:.2f} × 2", f"{summary.beyond}", f"{summary.actions_not_finite}")
+        cells = (
+            f"{summary.hours:.2f} × {len(results.endurance.conditions)}",
+            f"{summary.beyond}",
+            f"{summary.actions_not_finite}",
+        )
         shares = tuple(f"{share:.4f}" for share in (*largest, least))
         rows.append((name, f"{summary.drives}", *cells, *shares))
     return TextTable("Limits: samples beyond them, largest use (1 is the limit)", header, tuple(rows))
@@ -367,6 +403,21 @@ def _errors(results: EnduranceResults) -> TextTable:
     ]
     title = "Cue errors, on the machine as it should be and on slower ones"
     return TextTable(title, ("policy", *_ERRORS, "worst drive", "its J slower"), tuple(rows))
+
+
+def _compensated(results: EnduranceResults) -> TextTable:
+    """J of policies that know a lateness, over J on the machine as it should be."""
+    names = [name for name, known in results.endurance.conditions.items() if known is not None]
+    header = ("policy", "J", "J slower", "ratio", *chain(*((name, "ratio", "at limit %") for name in names)))
+    rows = []
+    for policy, summary in results.summaries.items():
+        cells = [number(summary.cue_error), number(summary.slower_cue_error), _ratio_cell(summary.ratio)]
+        for name in names:
+            error = summary.compensated[name]
+            ratio = _ratio_cell(_ratio(error, summary.cue_error))
+            cells += [number(error), ratio, percent(summary.at_limit[name])]
+        rows.append((policy, *cells))
+    return TextTable("Slower machines whose lateness is known", header, tuple(rows))
 
 
 def _kinds(results: EnduranceResults) -> TextTable:

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...baselines.compensation import Compensated, CompensationOptions
 from ...baselines.interface import Machines
 from ...baselines.policy import Policy
 from ...envs.arrays import FLOAT
@@ -36,7 +37,6 @@ from ..rollout import Rollout
 from ..studies.study import identity
 from .results import (
     NOMINAL,
-    SLOWER,
     Endurance,
     EnduranceStore,
     Endured,
@@ -275,8 +275,6 @@ def _alone(plan: Plan) -> CueTrace | None:
 Progress = Callable[[str, float], None]
 """Called with the policy and condition at hand, and the seconds of drive done since the last call."""
 
-CONDITIONS: Final = (NOMINAL, SLOWER)
-
 
 class Stopped(Exception):  # noqa: N818  (not an error)
     """Raised by a :data:`Progress` to stop."""
@@ -337,7 +335,7 @@ class EnduranceRun:
         for label, policy in self._policies.items():
             key = drive_key(
                 platform=to_dict(request.platform),
-                endurance=to_dict(request.endurance),
+                endurance=request.endurance.about(),
                 policy=identity(request.policies[label], policy),
             )
             self._stores[label] = EnduranceStore(request.folder, label, key, fresh)
@@ -346,7 +344,7 @@ class EnduranceRun:
     def seconds(self) -> float:
         """Of drive that are to be done, all policies and conditions."""
         drives = sum(len(store.missing(self._request.seeds)) for store in self._stores.values())
-        return drives * len(CONDITIONS) * self._request.endurance.duration
+        return drives * len(self._request.endurance.conditions) * self._request.endurance.duration
 
     def drive(self, progress: Progress) -> EnduranceOutcome:
         """Drive to the end, or until ``progress`` raises :class:`Stopped`; finished drives are on disk."""
@@ -382,7 +380,7 @@ class EnduranceRun:
         results: dict[str, list[Endured]] = {}
         extremes: dict[str, dict[str, float]] = {}
         endurance, platform = self._request.endurance, self._request.platform
-        for condition in CONDITIONS:
+        for condition, known in endurance.conditions.items():
 
             def report(steps: int, what: str = f"{label}, {condition}") -> None:
                 progress(what, steps * len(drives) * TIME_STEP)
@@ -392,7 +390,10 @@ class EnduranceRun:
                 platforms=endurance.machines_under(condition, platform),
                 platform_of=[0 if condition == NOMINAL else drive.machine for drive in drives],
             )
-            run = Rollout(self._policies[label], machines, finite=True)
+            policy = self._policies[label]
+            if known is not None:
+                policy = Compensated(policy, CompensationOptions(known=known))
+            run = Rollout(policy, machines, finite=True)
             results[condition], extremes[condition] = drive_and_check(run, platform, report)
         self._stores[label].keep(_records(drives, results), extremes)
         self._outcome.driven += len(drives)

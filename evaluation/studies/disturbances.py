@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
+from ...baselines.compensation import Compensated, CompensationOptions
 from ...baselines.interface import Interface, Machines
 from ...baselines.policy import Policy, Wrapper, as_policy
 from ...envs.car import Car
@@ -133,12 +134,15 @@ class Disturbances:
         dead_time: Of the actuators, s.
         noise: Of the sensors.
         time_scaling: Factor on all accelerations of the drives; see :func:`time_scaled`.
+        known: Machines with lag and dead time at once are driven as well, where this is not empty: by
+            policies that know nothing of it, and by such that compensate this many times the true lateness.
     """
 
     lag: Positive = 30.0
     dead_time: Positive = 0.05
     noise: SensorNoise = SensorNoise()
     time_scaling: Annotated[float, Field(ge=1.0, le=4.0)] = 2.0
+    known: tuple[Positive, ...] = ()
 
 
 def time_scaled(cues: CueTrace, factor: float) -> CueTrace:
@@ -167,17 +171,6 @@ def time_scaled(cues: CueTrace, factor: float) -> CueTrace:
     return faster.resampled(cues.dt)
 
 
-def with_dynamics(platform: Platform, dynamics: ActuatorDynamics) -> Platform:
-    """The machine with the same lag and dead time in all its actuators."""
-    carriage, turntable = platform.carriage, platform.turntable
-    return replace(
-        platform,
-        hexapod=replace(platform.hexapod, dynamics=dynamics),
-        carriage=None if carriage is None else replace(carriage, dynamics=dynamics),
-        turntable=None if turntable is None else replace(turntable, dynamics=dynamics),
-    )
-
-
 @dataclass(frozen=True)
 class Study:
     """What a study of robustness drives.
@@ -201,7 +194,8 @@ class Study:
     def conditions(self) -> list[Condition]:
         """The nominal condition, then one for each disturbance.
 
-        Every policy is made for the machine as it should be and knows nothing of the disturbance.
+        Every policy is made for the machine as it should be and knows nothing of the disturbance, but for
+        compensated ones, which know a lateness.
         """
         lag, dead_time = self.disturbances.lag, self.disturbances.dead_time
         lagging = ActuatorDynamics(natural_frequency=lag)
@@ -219,6 +213,7 @@ class Study:
                 maneuvers=self.maneuvers(self.other),
             ),
             self._time_scaled(),
+            *self._late(ActuatorDynamics(natural_frequency=lag, dead_time=dead_time)),
         ]
 
     @cached_property
@@ -236,12 +231,35 @@ class Study:
         return policy
 
     def _slower(self, name: str, description: str, dynamics: ActuatorDynamics) -> Condition:
-        driven = with_dynamics(self.platform, dynamics)
+        driven = self.platform.with_dynamics(dynamics)
 
         def make(given: Any) -> Policy:
             return self._made(given).on(driven)
 
         return replace(self._nominal, name=name, description=description, platform=driven, make=make)
+
+    def _late(self, dynamics: ActuatorDynamics) -> list[Condition]:
+        """The machine with lag and dead time at once, and compensated; none where nothing is known."""
+        if not self.disturbances.known:
+            return []
+        late = f"lag and dead time at once: {1e3 * dynamics.lateness:.0f} ms late"
+        uncompensated = self._slower("late", late, dynamics)
+        return [uncompensated, *(self._compensated(uncompensated, k) for k in self.disturbances.known)]
+
+    def _compensated(self, late: Condition, known: float) -> Condition:
+        options = CompensationOptions(known=known)
+
+        def make(given: Any) -> Policy:
+            return Compensated(self._made(given), options).on(late.platform)
+
+        what = "" if known == 1.0 else f", known ×{known:g}"
+        return replace(
+            late,
+            name=f"late, compensated{what}",
+            description=f"{late.description}, compensated{what}",
+            make=make,
+            about={"compensation": to_dict(options)},
+        )
 
     def _noisy(self) -> Condition:
         noise = self.disturbances.noise

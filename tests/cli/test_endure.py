@@ -177,3 +177,31 @@ def test_damaged_drives_and_foreign_results_are_refused(tmp_path, capsys):
     (tmp_path / "endurance.json").write_text(json.dumps({"mine": 1}))
     assert main(argv) == 2
     assert "was not written by this command" in capsys.readouterr().err
+
+
+def test_compensated_drives_are_conditions_of_their_own(tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["endure", "--policies", "no-motion", "learned", "--duration", str(SECONDS), "--out", str(out)]
+    argv += drive_hours(2)
+    compensated = [*argv, "--compensate", "--lateness-error", "0.2"]
+    assert main(compensated) == 0
+    shown = capsys.readouterr().out
+    assert "Slower machines whose lateness is known" in shown
+    assert "known ×0.8" in shown
+    results = EnduranceResults.load_json(out / "endurance.json")
+    names = {"compensated", "compensated, known ×0.8", "compensated, known ×1.2"}
+    assert set(results.summaries["learned"].compensated) == names
+    still = results.policies["no-motion"].drives[0].conditions
+    assert len({one.cue_error for one in still.values()}) == 1
+    errors = [one.cue_error for one in results.policies["learned"].drives[0].conditions.values()]
+    assert len(set(errors)) == 5
+    # Without compensation it is another study; its drives are as they always were.
+    assert main(argv) == 0
+    assert "4 drives driven now" in capsys.readouterr().out
+    again = EnduranceResults.load_json(out / "endurance.json").policies["learned"].drives[0].conditions
+    assert [again[name].cue_error for name in (NOMINAL, SLOWER)] == errors[:2]
+
+
+def test_an_error_of_the_lateness_beyond_all_of_it_is_refused(capsys):
+    assert main([*ARGV, "--compensate", "--lateness-error", "1.5"]) == 2
+    assert "--lateness-error must be at least 0 and below 1, found 1.5" in capsys.readouterr().err

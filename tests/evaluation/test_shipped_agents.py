@@ -10,7 +10,6 @@ from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.evaluation import Metrics, Trajectory, measure, rollout
-from motion_cueing.evaluation.studies.disturbances import with_dynamics
 from motion_cueing.train.agents import Agent, agent_names, get_agent
 
 pytestmark = pytest.mark.slow
@@ -105,7 +104,7 @@ def test_it_does_not_chatter_where_the_car_is_driven_gently(measured):
 def test_late_actuators_change_nothing_of_what_it_asks_for(name):
     """There is no loop through the actuators that lag and dead time could make swing."""
     agent, paper = get_agent(name), get_platform("paper")
-    slow = with_dynamics(paper, ActuatorDynamics(natural_frequency=30.0, dead_time=0.05))
+    slow = paper.with_dynamics(ActuatorDynamics(natural_frequency=30.0, dead_time=0.05))
     cues = get_maneuver("slalom").drive()
     at_once, late = (rollout(agent.on(platform), cues, platform) for platform in (paper, slow))
     np.testing.assert_allclose(late.action, at_once.action, rtol=0.0, atol=1e-3)

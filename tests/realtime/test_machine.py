@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motion_cueing.baselines import ClassicalWashout
+from motion_cueing.baselines.compensation import Compensated
 from motion_cueing.baselines.washout import ScheduledWashout
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.platform import legs_of_pose
+from motion_cueing.envs.platform.machines import ActuatorDynamics
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.envs.task.options import load_task
@@ -138,6 +140,63 @@ def test_a_machine_that_lags():
     assert np.abs(bench.setpoints[-2].motion[:2] - expected.carriage[-1]).max() > 1e-3
     logged = bench.trajectory(lagging)
     np.testing.assert_allclose(logged.carriage, expected.carriage, atol=1e-12)
+
+
+LATE = PAPER.with_dynamics(
+    {
+        "carriage": ActuatorDynamics(natural_frequency=25.0, dead_time=0.02),
+        "hexapod": ActuatorDynamics(natural_frequency=70.0, dead_time=0.03),
+    }
+)
+
+
+def assert_same_late_motion(bench: Bench, expected) -> None:
+    """The log tells the drive of a rollout, on the machine as it is."""
+    assert not bench.controller.faults
+    logged = bench.trajectory(LATE)
+    for name in ("carriage", "hexapod", "turntable", "f_simulator"):
+        last = len(logged.time) - bench.machine.ahead_steps - 1
+        np.testing.assert_allclose(getattr(logged, name)[:last], getattr(expected, name)[:last], atol=1e-9)
+    assert np.abs(expected.hexapod).max() > 0.005
+
+
+@pytest.mark.parametrize("name", ["classical", "learned", "residual"])
+def test_a_compensated_policy_on_a_late_machine(name):
+    if name == "residual":
+        task = TaskOptions(action=ActionOptions(mode="residual", repeat=3))
+        policy = Compensated(Feedback(task, ClassicalWashout(), 9)).on(LATE)
+    else:
+        policy = make_policy(name, LATE.with_dynamics(ActuatorDynamics()))
+        policy = Compensated(policy).for_platform(LATE)
+    bench = Bench(policy, platform=LATE)
+    bench.drive(TRACE)
+    assert_same_late_motion(bench, rollout(policy, TRACE, LATE))
+
+
+def test_a_compensated_policy_goes_on_after_it_braked():
+    """The ideal machine begins again where the late one's set-points are."""
+    policy = Compensated(make_policy("learned", PAPER)).for_platform(LATE)
+    bench = Bench(policy, platform=LATE)
+    bench.drive(TRACE)
+    bench.settle(cues=False)
+    first = bench.drive(TRACE)
+    assert not bench.controller.faults
+    assert np.abs(np.diff(first[:, :9], axis=0)).max() < 0.05
+    assert {State.BRAKING, State.RUNNING} <= {setpoint.state for setpoint in bench.setpoints}
+
+
+def test_a_compensated_preview_reaches_further():
+    policy = Feedback(TaskOptions(observation=ObservationOptions(preview=3, preview_spacing=0.2)))
+    compensated = Compensated(policy).on(LATE)
+    bench = Bench(compensated, platform=LATE)
+    ahead = bench.machine.ahead_steps
+    # 0.6 s, and 20 ms and 2 / 45 of the carriage behind its lead.
+    assert ahead == 60 + round(100 * (0.02 + 2.0 / 45.0))
+    bench.drive(TRACE)
+    force = np.vstack([np.tile([0.0, 0.0, -9.81], (ahead, 1)), TRACE.specific_force])
+    rate = np.vstack([np.zeros((ahead, 3)), TRACE.angular_velocity])
+    later = CueTrace("later", 0.01 * np.arange(len(force)), force, rate)
+    assert_same_late_motion(bench, rollout(compensated, later, LATE))
 
 
 def test_the_shipped_agents_and_cues_over_the_network():

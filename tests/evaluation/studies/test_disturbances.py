@@ -47,11 +47,11 @@ def test_no_fiercer_is_the_same():
     np.testing.assert_array_equal(same.time, cues.time)
 
 
-def robust(causal=()):
+def robust(causal=(), known=()):
     def maneuvers(car):
         return {"bend": lambda: bend(force=1.0 if car.name == "sedan" else 1.5)}
 
-    return Study(PAPER, SEDAN, get_car("volvo-v40"), maneuvers, Disturbances(), frozenset(causal))
+    return Study(PAPER, SEDAN, get_car("volvo-v40"), maneuvers, Disturbances(known=known), frozenset(causal))
 
 
 def test_each_condition_of_robustness_disturbs_one_thing():
@@ -74,6 +74,19 @@ def test_dead_time_delays_what_is_felt_and_the_controller_does_not_know():
         one = found[name]
         felt[name] = rollout(one.make("classical"), one.maneuvers["bend"](), one.platform).w_simulator[:, 2]
     np.testing.assert_allclose(felt["dead time"][5:], felt["nominal"][:-5], atol=1e-9)
+
+
+def test_late_machines_are_driven_with_and_without_what_is_known_of_them():
+    found = {one.name: one for one in robust(known=(1.0, 0.7)).conditions()}
+    assert list(found)[6:] == ["late", "late, compensated", "late, compensated, known ×0.7"]
+    assert found["late"].description == "lag and dead time at once: 117 ms late"
+    plain, known, short = (found[name].make("learned-preview") for name in list(found)[6:])
+    # 2 s, dead time and 2 / 45 s; 70 % of the dead time, and 2 / 45 s of a known lag of 30 / 0.7.
+    assert plain.information.seconds == pytest.approx(2.0)
+    assert known.information.seconds == pytest.approx(2.09)
+    assert short.information.seconds == pytest.approx(2.08)
+    keys = {drive_key(about=dict(one.about)) for one in list(found.values())[6:]}
+    assert len(keys) == 3
 
 
 def test_an_agent_meets_a_machine_it_does_not_know():
