@@ -26,8 +26,8 @@ SLOWEST: Final = 3.0
 NO_STOP: Final = 1e4
 """Distance to a stop where none is known, m."""
 
-HIGHEST_LIMIT: Final = 100.0
-"""Speed limit where there is none, m/s."""
+ROAD_TIMES: Final = (0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0)
+"""Times ahead at which a packet of the real-time loop has the road, by the present speed, s."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,16 +11,20 @@ from numpy.typing import NDArray
 
 from ..baselines.interface import Live, Machines
 from ..baselines.policy import Policy, as_policy
-from ..envs.cues import GRAVITY, CueTrace
+from ..envs.cues import CONTROLS, GRAVITY, CueTrace
 from ..envs.errors import ActionError, ConfigurationError
 from ..envs.perception import VestibularModel, get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.platform.kernels.step import CARRIAGE, LEGS, TURNTABLE
+from ..envs.road import ROAD_TIMES, Ahead, RoadMap, Route
 from ..envs.simulator.kernels.observation import SCALES
 from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
+from ..envs.task.kernels.observation import ObservationOptions
+from ..envs.task.knowledge import Controls as KnownControls
+from ..envs.task.knowledge import KnownRows
 from ..evaluation.rollout import Actor
 from ..evaluation.suite import explain
-from .packets import MOTION, MOTION_SIZE
+from .packets import MOTION, MOTION_SIZE, Cues, Road
 
 Floats = NDArray[np.float64]
 
@@ -37,8 +41,12 @@ NOW: Final = 1
 def standing(ahead: int) -> CueTrace:
     """The drive whose rows :class:`LiveCues` fills: what was, what is, and ``ahead`` steps to come."""
     n = NOW + 1 + ahead
-    time = np.asarray(TIME_STEP * np.arange(n), dtype=np.float64)
-    return CueTrace("live", time, np.tile(AT_REST[:3], (n, 1)), np.zeros((n, 3)))
+    time, still, level = np.asarray(TIME_STEP * np.arange(n), dtype=np.float64), np.zeros(n), np.zeros(2)
+    road = RoadMap.of_route(Route.unknown(level, 0.0), level, None, still, still)
+    channels = dict.fromkeys(CONTROLS, still)
+    return CueTrace(
+        "live", time, np.tile(AT_REST[:3], (n, 1)), np.zeros((n, 3)), channels=channels, road=road
+    )
 
 
 class LiveCues:
@@ -62,14 +70,23 @@ class LiveCues:
             for memory, constants in live.memories
             if constants
         ]
+        self._known = [_LiveKnown(rows.view, options) for rows, options in live.known if options.knows]
 
     @property
     def reference_cue(self) -> Floats:
         """(6,) cues of the car now."""
         return np.concatenate([self._rows[0][NOW], self._rows[1][NOW]])
 
-    def put(self, cues: Floats) -> None:
-        """Move on by a time step, with the newest cues (6,): force, m/s^2, angular velocity, rad/s."""
+    def put(self, cues: Floats, known: Cues | None = None) -> None:
+        """Move on by a time step.
+
+        Args:
+            cues: (6,) the newest: force, m/s^2, angular velocity, rad/s.
+            known: The packet with controls and road; None for a car that stands.
+
+        Raises:
+            ConfigurationError: the policy sees what the packet does not have.
+        """
         change = (cues[3:] - self._moves[1][2]) / TIME_STEP
         for (earlier, later, last), newest in zip(self._moves, (cues[:3], cues[3:], change), strict=True):
             earlier[...] = later
@@ -79,6 +96,8 @@ class LiveCues:
         scaled = self._scaled()
         for one in self._low_passes:
             one.put(scaled)
+        for rows in self._known:
+            rows.put(known)
 
     def begin(self) -> None:
         """Take the car to have moved for ever as it moves now, as at the beginning of any drive."""
@@ -88,6 +107,49 @@ class LiveCues:
     def _scaled(self) -> Floats:
         """(6,) cues of the car now, as an observation scales them."""
         return np.asarray((self.reference_cue - AT_REST) / _SCALE)
+
+
+class _LiveKnown:
+    """Controls and road of the present sample, in the row that observations read.
+
+    Args:
+        rows: (samples, size) that observations read.
+        options: What is seen.
+    """
+
+    def __init__(self, rows: NDArray[Any], options: ObservationOptions) -> None:
+        self._row, self._options, self._make = rows[NOW], options, KnownRows(options)
+        self._smooth: Floats | None = None
+
+    def put(self, packet: Cues | None) -> None:
+        """Move on by a time step, with a packet; None for a car that stands."""
+        if packet is None:
+            self._smooth = None
+            self._row[...] = self._make(_standing_controls(), None, _NO_MAP)[0][0]
+            return
+        if packet.controls is None:
+            raise ConfigurationError("the policy sees the car's speed, which the packets do not have")
+        if self._options.road and packet.road is None and not self._options.allow_missing:
+            raise ConfigurationError("the policy sees the road ahead, which the packets do not have")
+        columns = [np.array([value]) for value in packet.controls]
+        controls = KnownControls(*columns, known=np.array([True]))
+        there = np.array([packet.road is not None])
+        rows, self._smooth = self._make(controls, self._ahead(packet.road), there, self._smooth)
+        self._row[...] = rows[0]
+
+    def _ahead(self, road: Road | None) -> Ahead | None:
+        if road is None:
+            return None
+        columns = [np.interp(self._options.road, ROAD_TIMES, column)[None, :] for column in road[:-1]]
+        return Ahead(*columns, stop_distance=np.array([road.stop_distance]))
+
+
+_NO_MAP: Final = np.array([False])
+
+
+def _standing_controls() -> KnownControls:
+    zero = np.zeros(1)
+    return KnownControls(zero, zero, zero, zero, zero, known=np.array([True]))
 
 
 class _LowPasses:
@@ -240,14 +302,18 @@ class LiveMachine:
         """(6,) cues of the car now: specific force, m/s^2, and angular velocity, rad/s."""
         return self._cues[0].reference_cue
 
-    def catch_up(self, cues: Floats) -> None:
+    def catch_up(self, cues: Floats, known: Cues | None = None) -> None:
         """Take the machine to where it was a step ahead, with the car's cues (6,) there.
+
+        Args:
+            cues: Specific force, m/s^2, and angular velocity, rad/s.
+            known: The packet with controls and road; None for a car that stands.
 
         Raises:
             Exception: any error of the policy's own code; the machine is there all the same.
         """
         for live_cues in self._cues:
-            live_cues.put(cues)
+            live_cues.put(cues, known)
         if self._last is None:
             for one in self._now.live:
                 one.simulator.reset(self.start, sample=NOW)

@@ -74,7 +74,8 @@ def test_rows_of_a_steady_turn():
     assert rows["road_speed"] == pytest.approx([5.0] * 3)
     # From 20 m/s to sqrt(3 / 0.01) within the 10 m to the first place.
     assert rows["road_braking"] == pytest.approx([0.0, (400.0 - 300.0) / 20.0, 0.0], rel=1e-5)
-    assert rows["road_known"] == 1.0 and rows["controls_known"] == 1.0
+    assert rows["road_known"] == 1.0
+    assert rows["controls_known"] == 1.0
 
 
 def test_a_turning_wheel_has_a_rate():
@@ -118,10 +119,13 @@ def test_a_drive_without_what_is_seen_is_refused_in_one_sentence():
 
 def test_what_is_missing_is_zero_and_said_so():
     rows, _ = seen(get_recording("commute"), replace(ALL, allow_missing=True))
-    assert rows["controls_known"] == 0.0 and rows["road_known"] == 1.0
-    assert not rows["pedals"].any() and rows["speed"] > 5.0
+    assert rows["controls_known"] == 0.0
+    assert rows["road_known"] == 1.0
+    assert not rows["pedals"].any()
+    assert rows["speed"] > 5.0
     rows, _ = seen(replace(steady(), road=None), replace(ALL, allow_missing=True))
-    assert rows["road_known"] == 0.0 and not rows["road_speed"].any()
+    assert rows["road_known"] == 0.0
+    assert not rows["road_speed"].any()
 
 
 def test_errors_are_drawn_for_each_drive_and_are_the_same_again():
@@ -133,11 +137,13 @@ def test_errors_are_drawn_for_each_drive_and_are_the_same_again():
     first, names = len(true[0]) - 5 - 3 * 5, slice(0, 10)
     curvature = rows[:, :, first + 3] / true[0, first + 3]
     known = rows[:, :, -1] == 1.0
-    assert 0.8 <= curvature[known].min() < 0.85 and 1.15 < curvature[known].max() <= 1.2
+    assert 0.8 <= curvature[known].min() < 0.85
+    assert 1.15 < curvature[known].max() <= 1.2
     assert 0.05 < 1.0 - known.mean() < 0.5
     assert not rows[~known][:, first:].any()
     blind = ~rows[:, 0, 9].astype(bool)
-    assert 3 <= blind.sum() <= 17 and not rows[blind][:, :, names].any()
+    assert 3 <= blind.sum() <= 17
+    assert not rows[blind][:, :, names].any()
 
 
 def test_the_gymnasium_environment_offers_the_rows():
