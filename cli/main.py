@@ -174,6 +174,15 @@ COMMANDS: Final[Mapping[str, Command]] = {
         goes_on=True,
         run="run_robustness",
     ),
+    "map-faults": Command(
+        ".studies",
+        "MapFaultsCommand",
+        "drive with wrong maps, gaps, and events that nobody announced",
+        "--policies learned learned-road --maneuvers slalom --out map-faults",
+        "look at study.png and study.md in --out",
+        goes_on=True,
+        run="run_map_faults",
+    ),
     "endure": Command(
         ".endure",
         "EndureCommand",

@@ -11,7 +11,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from .errors import DataError
 
@@ -150,6 +149,9 @@ class RoadMap:
             dt: Time step, s.
             speed_limit: The legal one, m/s.
         """
+        # Imported here: this module is part of every command line.
+        from scipy.ndimage import gaussian_filter1d
+
         station = np.concatenate(([0.0], np.cumsum(0.5 * dt * (speed[1:] + speed[:-1]))))
         # Where the car stands it does not turn; what is measured there is the error of the sensor.
         turning = np.where(speed < _STANDING, 0.0, yaw_rate)
