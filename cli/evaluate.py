@@ -21,6 +21,7 @@ from .arguments import (
     PlatformName,
     PolicyNames,
     ScaleText,
+    option,
     several,
 )
 
@@ -54,6 +55,10 @@ class EvaluateCommand:
     suite: Literal[1, 2] = 1
     """Version of the standard maneuvers that `all` stands for."""
     scale: ScaleText = "1"
+    preview: Literal["true", "held", "predicted"] = "true"
+    """Where policies with a preview have it from: the drive itself, the present cue, or a predictor."""
+    predictor: Annotated[str, option("NAME|FILE.safetensors")] = "road"
+    """The predictor of --preview predicted: that of the package, or the file of another one."""
     figures: bool = False
     """Draw figures for print as well, in PDF and PNG: one a maneuver, and the benchmark."""
     out: OutFolder = Path("results")
@@ -188,10 +193,15 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         policies, missing = arguments.make_policies(command.policies, platform)
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
-    return Plan(
-        maneuvers=cue_sources(recorded)
+    sources = (
+        cue_sources(recorded)
         if recorded
-        else at_scale(arguments.find_maneuvers(command.maneuvers, car, command.suite), scale),
+        else at_scale(arguments.find_maneuvers(command.maneuvers, car, command.suite), scale)
+    )
+    if command.preview != "true":
+        sources = arguments.with_previews(sources, command.preview, command.predictor)
+    return Plan(
+        maneuvers=sources,
         policies=drives,
         platform=platform,
         car=car,

@@ -174,6 +174,13 @@ COMMANDS: Final[Mapping[str, Command]] = {
         goes_on=True,
         run="run_robustness",
     ),
+    "predict": Command(
+        ".predict",
+        "PredictCommand",
+        "measure a predictor of the cues ahead by lead time",
+        "--drives 20 --out prediction",
+        "`motion-cueing evaluate --preview predicted` drives policies with it",
+    ),
     "map-faults": Command(
         ".studies",
         "MapFaultsCommand",

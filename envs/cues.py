@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ConfigurationError, DataError, reason
+from .expected import ExpectedCues
 from .limits import MOST_CELLS, MOST_COLUMNS, read_table_text
 from .road import RoadMap
 from .settings import NonNegative, configuration
@@ -154,6 +155,7 @@ class CueTrace:
         source: Where the trace comes from, for reports.
         scale: By which the cues have been scaled already, see :meth:`scaled`.
         road: Road ahead: what a map and a scenario know; None where nothing is known.
+        expected: Expected cues, which policies with a preview see in place of the true ones; None for these.
 
     Raises:
         DataError: a shape is wrong, a value is not finite, or time does not advance in equal steps.
@@ -168,6 +170,7 @@ class CueTrace:
     source: str = ""
     scale: CueScale = UNSCALED
     road: RoadMap | None = None
+    expected: ExpectedCues | None = None
 
     def __post_init__(self) -> None:
         time = _checked(self.name, "time", self.time, (None,))
@@ -187,6 +190,8 @@ class CueTrace:
         object.__setattr__(self, "channels", channels)
         if self.road is not None and len(self.road) != n:
             raise DataError(f"{self.name}: road has {len(self.road)} samples, expected {n}")
+        if self.expected is not None and len(self.expected) != n:
+            raise DataError(f"{self.name}: expected cues have {len(self.expected)} samples, not {n}")
 
     def __len__(self) -> int:
         return len(self.time)
@@ -229,9 +234,14 @@ class CueTrace:
         """The reference at a motion scale: the one place where a drive is scaled.
 
         The channels stay: they are the car's. A neutral scale returns the trace itself.
+
+        Raises:
+            DataError: the drive carries expected cues; these come after the scale.
         """
         if scale.neutral:
             return self
+        if self.expected is not None:
+            raise DataError(f"{self.name}: a drive with expected cues cannot be scaled")
         return replace(
             self,
             specific_force=scale.of_force(self.specific_force),
@@ -256,6 +266,8 @@ class CueTrace:
             raise DataError(f"{self.name}: time step must be positive, found {dt}")
         if abs(self.dt / dt - 1.0) <= 1e-9:
             return self
+        if self.expected is not None:
+            raise DataError(f"{self.name}: a drive with expected cues keeps its time step")
         steps = self.duration / dt + 1e-9
         if not 1.0 <= steps < _MOST_SAMPLES:
             raise DataError(

@@ -28,7 +28,7 @@ from ..platform.machines import Platform
 from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
 from .arrays import FRAME, BatchArrays, Launches, rules_of
 from .kernels.observation import ObservationOptions, layout_of, low_passed
-from .knowledge import known_of
+from .knowledge import expected_of, known_of
 from .options import TaskOptions
 from .sensors import sensed_drives
 
@@ -230,6 +230,8 @@ class TaskBase(_Remembering):
         memory = low_passed(sensed, task.observation.memory, TIME_STEP)
         errors, seed = options.randomization.road, options.episode.library_seed
         known = known_of(drives, task.observation, errors, seed)
+        expected = expected_of(drives, task.observation)
+        known = np.hstack((known, expected)) if expected.size else known
         self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, known, simulator.device)
         self.known = ((self.arrays.known, task.observation),)
         self.memories = ((self.arrays.memory, task.observation.memory),)
@@ -237,6 +239,7 @@ class TaskBase(_Remembering):
         rules = rules_of(
             task, layout, simulator.platforms, TIME_STEP, simulator.device, () if sensors.perfect else sensed
         )
+        rules.view.expected = expected.shape[1]
         self._launches = Launches(simulator, self.arrays, rules)
         self._commanded = self.arrays.command.view["commanded"]
 

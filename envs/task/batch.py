@@ -36,7 +36,7 @@ from .episode import (
 )
 from .kernels.action import action_scale
 from .kernels.observation import COMPARED, ObservationOptions, layout_of, low_passed
-from .knowledge import known_of
+from .knowledge import expected_of, known_of
 from .options import TaskOptions
 from .sensors import sensed_drives
 
@@ -96,6 +96,8 @@ class Batch:
         memory = low_passed(seen, options.observation.memory, TIME_STEP)
         errors = options.randomization.road
         known = known_of(self.drives, options.observation, errors, options.episode.library_seed)
+        expected = expected_of(self.drives, options.observation)
+        known = np.hstack((known, expected)) if expected.size else known
         self.arrays = BatchArrays(n, self.action_size, self.layout, memory, known, self.simulator.device)
         self._clipped: NDArray[np.int32] = self.arrays.command.view["clipped"]
         self.base = self._base(policy)
@@ -109,6 +111,7 @@ class Batch:
         self.rules = rules_of(
             options, self.layout, platforms, TIME_STEP, self.simulator.device, () if sensors.perfect else seen
         )
+        self.rules.view.expected = expected.shape[1]
         self._launches = Launches(self.simulator, self.arrays, self.rules)
         self.beside = self._base_alone(policy)
 

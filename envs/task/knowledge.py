@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.signal import lfilter
 
-from ..cues import CONTROLS, CueTrace
+from ..cues import CONTROLS, GRAVITY, CueTrace
 from ..errors import ConfigurationError
 from ..road import NO_STOP, SLOWEST, Ahead
 from ..settings import NonNegative, Positive, check_range, configuration
+from ..simulator.kernels.observation import SCALES
 from ..simulator.simulator import TIME_STEP
 from .kernels.observation import CONTROL_ROWS, EACH_TIME, ROAD_ROWS, SPEED_ROWS, ObservationOptions
 
@@ -256,7 +257,7 @@ def known_of(
         ConfigurationError: a drive has no controls or no road, and ``allow_missing`` is off.
     """
     if not options.knows:
-        return np.zeros((1, 0), dtype=np.float32)
+        return np.zeros((sum(map(len, drives)), 0), dtype=np.float32)
     rows = []
     for number, drive in enumerate(drives):
         if errors != MapErrors():
@@ -292,3 +293,28 @@ def _of_drive(drive: CueTrace, options: ObservationOptions) -> Floats:
     if drive.road is None or not options.road:
         return make(controls, None, nowhere)[0]
     return make(controls, drive.road.ahead(make.distances(controls.speed)), drive.road.known)[0]
+
+
+def expected_of(drives: Sequence[CueTrace], options: ObservationOptions) -> NDArray[np.float32]:
+    """(samples of all drives, 6 per sample of the preview) expected cues, scaled as the observation's.
+
+    It has no columns where the preview is the true one.
+
+    Raises:
+        ConfigurationError: some of the drives carry expected cues, others do not.
+    """
+    carried = [drive.expected is not None for drive in drives]
+    if not options.preview or not any(carried):
+        return np.zeros((sum(map(len, drives)), 0), dtype=np.float32)
+    if not all(carried):
+        raise ConfigurationError("all drives must carry expected cues, or none")
+    stride = max(1, round(options.preview_spacing / TIME_STEP))
+    times = TIME_STEP * stride * np.arange(1, options.preview + 1)
+    rest = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
+    scale = np.repeat([SCALES["reference_force"], SCALES["reference_rate"]], 3)
+    rows = []
+    for drive in drives:
+        assert drive.expected is not None
+        now = np.hstack((drive.specific_force, drive.angular_velocity))
+        rows.append(((drive.expected.at(now, times) - rest) / scale).reshape(len(drive), -1))
+    return np.concatenate(rows).astype(np.float32)

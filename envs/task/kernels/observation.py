@@ -583,6 +583,7 @@ class View:
     frame: int  # entries of a frame
     first: Firsts
     known: int  # first entry of what is known beside the cues, -1 for nothing
+    expected: int  # entries of the expected cues, the last columns of what is known; 0 for the true ones
     preview_samples: int
     preview_stride: int  # time steps between samples
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
@@ -840,14 +841,19 @@ def write_frame(
         added = axes_in_view(v, s.setpoint, base)
         put_vector(out, i, f.base_action, added, 9, wp.static(UNIT["base_action"]), bounds)
     if f.preview >= 0:
-        put_preview(v, drives, drive, s.sample, bounds, out, i)
+        if v.expected > 0:
+            row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
+            for k in range(v.expected):
+                put_entry(out, i, f.preview + k, real(known[row, known.shape[1] - v.expected + k]), bounds)
+        else:
+            put_preview(v, drives, drive, s.sample, bounds, out, i)
     if f.memory >= 0:
         row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
         for k in range(memory.shape[1]):
             put_entry(out, i, f.memory + k, real(memory[row, k]), bounds)
     if v.known >= 0:
         row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
-        for k in range(known.shape[1]):
+        for k in range(known.shape[1] - v.expected):
             put_entry(out, i, v.known + k, real(known[row, k]), bounds)
     if f.perceived_reference_force >= 0:
         put_perceived(f, s, bounds, out, i)
