@@ -205,6 +205,12 @@ class RoadMap:
             stop_distance=np.maximum(stop, 0.0),
         )
 
+    def unmapped(self, where: NDArray[np.bool_]) -> RoadMap:
+        """The map with points (p,) at which it is straight, whatever is driven there."""
+        return replace(
+            self, curvature=np.where(where, 0.0, self.curvature), cones=np.where(where, 0.0, self.cones)
+        )
+
     def missing(self, where: NDArray[np.bool_]) -> RoadMap:
         """The map with samples (n,) in which it is not there."""
         return replace(self, known=self.known & ~where)

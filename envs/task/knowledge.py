@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 
 from ..cues import CONTROLS, GRAVITY, CueTrace
 from ..errors import ConfigurationError
-from ..road import NO_STOP, SLOWEST, Ahead
+from ..road import NO_STOP, SLOWEST, SPACING, Ahead
 from ..settings import NonNegative, Positive, check_range, configuration
 from ..simulator.kernels.observation import SCALES
 from ..simulator.simulator import TIME_STEP
@@ -62,6 +62,8 @@ class MapErrors:
         missing: Largest share of time in which the map is not there.
         missing_time: Mean duration of a gap, s.
         unannounced: Share of drives whose scenario says nothing of cones and stops.
+        unmapped: Largest share of the way on which the map is straight, whatever is driven there: swerves.
+        unmapped_length: Mean length of such a stretch, m.
         without_controls: Share of drives without steering wheel and pedals.
     """
 
@@ -70,6 +72,8 @@ class MapErrors:
     missing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     missing_time: Positive = 3.0
     unannounced: Share = 0.0
+    unmapped: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    unmapped_length: Positive = 100.0
     without_controls: Share = 0.0
 
     def __post_init__(self) -> None:
@@ -84,6 +88,9 @@ class MapErrors:
         if road is not None:
             road = road.wrong(scale, shift).missing(_gaps(chance, share, self.missing_time, drive.dt))
             road = road.unannounced() if silent < self.unannounced else road
+            if self.unmapped > 0.0:
+                share, chance = self.unmapped * float(rng.uniform()), rng.uniform(size=len(road.curvature))
+                road = road.unmapped(_gaps(chance, share, self.unmapped_length, SPACING))
         if blind < self.without_controls:
             channels = {name: values for name, values in channels.items() if name not in _WHEEL_AND_PEDALS}
         return dataclasses.replace(drive, road=road, channels=channels)
@@ -94,7 +101,7 @@ _KNOWLEDGE_STREAM: Final = 5
 
 
 def _gaps(chance: Floats, share: float, duration: float, dt: float) -> Flags:
-    """(n,) whether the map is missing: a chain of two states with a share of time and a mean duration, s."""
+    """(n,) whether the map is wrong: a chain of two states with a share of time and a mean duration."""
     recover = min(dt / duration, 1.0)
     fail = min(recover * share / (1.0 - share), 1.0)
     missing, out = np.zeros(len(chance), dtype=bool), False

@@ -56,6 +56,9 @@ def test_errors_of_the_map():
     # What lies 10 m farther ahead on a wrong map is found 10 m later.
     shifted = road.wrong(shift=10.0).ahead(distance + 10.0).curvature
     np.testing.assert_allclose(shifted, true, atol=1e-12)
+    straight = road.unmapped(np.arange(1000) < 100)
+    assert (straight.ahead(distance).curvature[:, 0] == 0.0)[:49].all()
+    np.testing.assert_array_equal(straight.ahead(distance).curvature[51:], true[51:])
     gone = np.arange(200) < 50
     assert (road.missing(gone).known == ~gone).all()
 
