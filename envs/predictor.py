@@ -27,7 +27,7 @@ from .settings import Positive, configuration, from_dict, to_dict
 from .simulator.simulator import TIME_STEP
 from .storage import write_bytes
 from .task.kernels.observation import ObservationOptions
-from .task.knowledge import MapErrors, known_of
+from .task.knowledge import KnownRows, MapErrors, known_of
 
 Floats = NDArray[np.float64]
 Array = NDArray[np.float32]
@@ -82,8 +82,7 @@ def inputs_of(
     parts = [(cues - REST) / SCALE]
     known = known_of([drive], options.seen, errors or MapErrors(), seed)
     parts.append(known)
-    # What changes quickly among the controls: wheel, pedals and speed are the first entries of the rows.
-    quick = known[:, :_QUICK] if options.controls else known[:, :0]
+    quick = quick_of(known, options)
     for ago in options.past:
         index = np.maximum(np.arange(len(drive)) - round(ago / TIME_STEP), 0)
         parts += [(cues[index] - cues) / SCALE, quick[index] - quick]
@@ -92,6 +91,51 @@ def inputs_of(
 
 _QUICK: Final = 6
 """Entries of the rows of controls whose past is seen: steering wheel to pedals."""
+
+
+def quick_of(known: Array, options: PredictorOptions) -> Array:
+    """The entries of rows of controls (n, size) whose past is seen, too."""
+    return known[:, :_QUICK] if options.controls else known[:, :0]
+
+
+class LivePredictor:
+    """A predictor sample by sample, for cues that come one by one.
+
+    Args:
+        predictor: The predictor.
+
+    Attributes:
+        rows: Makes rows of controls and road.
+    """
+
+    def __init__(self, predictor: Predictor) -> None:
+        self._predictor = predictor
+        options = predictor.options
+        self.rows = KnownRows(options.seen)
+        self._ago = [round(ago / TIME_STEP) for ago in options.past]
+        self._past: list[tuple[Floats, Array]] = []
+
+    def begin(self) -> None:
+        """Forget the past: the car is taken to have moved as at the next sample."""
+        self._past = []
+
+    def __call__(self, cues: Floats, known: Floats) -> Floats:
+        """(m, 6) expected cues at the leads.
+
+        Args:
+            cues: (6,) now.
+            known: (size,) rows of controls and road now.
+        """
+        predictor = self._predictor
+        row = known.astype(np.float32)
+        quick = quick_of(row[None], predictor.options)[0]
+        self._past = [(cues, quick), *self._past[: max(self._ago)]]
+        parts = [(cues - REST) / SCALE, row]
+        for ago in self._ago:
+            before, quick_before = self._past[min(ago, len(self._past) - 1)]
+            parts += [(before - cues) / SCALE, quick_before - quick]
+        out = predictor.outputs(np.concatenate(parts).astype(np.float32)[None])
+        return np.asarray(cues + SCALE * out[0, 0].astype(np.float64))
 
 
 def cues_of(drive: CueTrace) -> Floats:

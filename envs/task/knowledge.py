@@ -158,11 +158,12 @@ class KnownRows:
 
     Attributes:
         size: Entries.
+        times: (t,) ahead at which the road is seen, s.
     """
 
     def __init__(self, options: ObservationOptions) -> None:
         self._options = options
-        self._times = np.array(options.road, dtype=np.float64)
+        self.times = np.array(options.road, dtype=np.float64)
         rows = [*(CONTROL_ROWS if options.controls else ()), *(SPEED_ROWS if options.knows else ())]
         sizes = [row.size for row in rows]
         if options.road:
@@ -174,7 +175,7 @@ class KnownRows:
 
     def distances(self, speed: Floats) -> Floats:
         """(n, times) at which the road is seen, m, for speeds (n,), m/s."""
-        return np.asarray(np.maximum(speed, SLOWEST)[:, None] * self._times)
+        return np.asarray(np.maximum(speed, SLOWEST)[:, None] * self.times)
 
     def __call__(
         self, controls: Controls, ahead: Ahead | None, mapped: Flags, smooth: Floats | None = None
@@ -218,7 +219,7 @@ class KnownRows:
         return [*((column.T * known).T for column in columns), known]
 
     def _road(self, speed: Floats, ahead: Ahead | None, mapped: Flags) -> list[Floats]:
-        times = len(self._times)
+        times = len(self.times)
         if ahead is None:
             size = EACH_TIME * times + sum(row.size for row in ROAD_ROWS[EACH_TIME:])
             return [np.zeros((len(speed), size))]
@@ -302,6 +303,12 @@ def _of_drive(drive: CueTrace, options: ObservationOptions) -> Floats:
     return make(controls, drive.road.ahead(make.distances(controls.speed)), drive.road.known)[0]
 
 
+def preview_times(options: ObservationOptions) -> Floats:
+    """(preview,) times ahead of the samples of a preview, s."""
+    stride = max(1, round(options.preview_spacing / TIME_STEP))
+    return np.asarray(TIME_STEP * stride * np.arange(1, options.preview + 1), dtype=np.float64)
+
+
 def expected_of(drives: Sequence[CueTrace], options: ObservationOptions) -> NDArray[np.float32]:
     """(samples of all drives, 6 per sample of the preview) expected cues, scaled as the observation's.
 
@@ -315,8 +322,7 @@ def expected_of(drives: Sequence[CueTrace], options: ObservationOptions) -> NDAr
         return np.zeros((sum(map(len, drives)), 0), dtype=np.float32)
     if not all(carried):
         raise ConfigurationError("all drives must carry expected cues, or none")
-    stride = max(1, round(options.preview_spacing / TIME_STEP))
-    times = TIME_STEP * stride * np.arange(1, options.preview + 1)
+    times = preview_times(options)
     rest = np.array([0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
     scale = np.repeat([SCALES["reference_force"], SCALES["reference_rate"]], 3)
     rows = []

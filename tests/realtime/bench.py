@@ -51,9 +51,9 @@ class Clock:
 class Bench:
     """A controller, its clock, and a sender of cues."""
 
-    def __init__(self, policy=None, watchdog=AT_ONCE, rate=100, platform=PAPER) -> None:
+    def __init__(self, policy=None, watchdog=AT_ONCE, rate=100, platform=PAPER, **preview) -> None:
         self.policy = policy or ClassicalWashout()
-        self.machine = make_machine(self.policy, platform)
+        self.machine = make_machine(self.policy, platform, **preview)
         inbox = Inbox(FLOATS, watchdog.stale, watchdog.overdue)
         options = ControllerOptions(rate=rate, watchdog=watchdog)
         self.controller = Controller(self.machine, platform, inbox, options)

@@ -15,6 +15,7 @@ from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.maneuvers import random_drives
 from motion_cueing.envs.platform import legs_of_pose
+from motion_cueing.envs.predictor import Predictor, PredictorOptions, inputs_of, with_preview
 from motion_cueing.envs.road import ROAD_TIMES
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.envs.task.kernels.observation import layout_of
@@ -109,6 +110,32 @@ def test_a_policy_that_sees_controls_and_road():
     assert not bench.controller.faults
     # Rows sample by sample differ from those of the whole drive by rounding.
     np.testing.assert_allclose(sent[:-1, :9], axes_of(expected)[1:], atol=1e-4)
+
+
+def untrained(path):
+    """A predictor with weights by chance, in a file."""
+    rng, options = np.random.default_rng(1), PredictorOptions()
+    size, outputs = inputs_of(known_drive(), options).shape[1], 12 * len(options.leads)
+    arrays = [rng.normal(size=shape).astype(np.float32) for shape in ((16, size), (outputs, 16))]
+    weights = tuple(a / a.shape[1] ** 0.5 for a in arrays)
+    biases = np.zeros(16, np.float32), np.zeros(outputs, np.float32)
+    ones = np.zeros(size, np.float32), np.ones(size, np.float32)
+    Predictor(options, *ones, weights, biases, {}).save(path)
+    return str(path)
+
+
+@pytest.mark.parametrize("preview", ["held", "predicted"])
+def test_expected_cues_in_place_of_a_preview(preview, tmp_path):
+    predictor = untrained(tmp_path / "any.safetensors")
+    seen = ObservationOptions(preview=3, preview_spacing=0.2, controls=True)
+    policy, drive = Feedback(TaskOptions(observation=seen)), known_drive()
+    bench = Bench(policy, preview=preview, predictor=predictor)
+    assert bench.machine.ahead_steps == 0
+    sent, expected = bench.drive(drive), rollout(policy, with_preview(drive, preview, predictor))
+    assert not bench.controller.faults
+    np.testing.assert_allclose(sent[:-1, :9], axes_of(expected)[1:], atol=1e-3)
+    true = axes_of(rollout(policy, drive))
+    assert np.abs(true - axes_of(expected)).max() > 0.01
 
 
 def test_packets_without_what_the_policy_sees_brake_the_machine():
