@@ -158,8 +158,8 @@ class Road(NamedTuple):
     def of(cls, numbers: Sequence[float]) -> Road:
         """From :attr:`numbers`."""
         n = len(ROAD_TIMES)
-        columns = [tuple(numbers[1 + k * n : 1 + (k + 1) * n]) for k in range(4)]
-        return cls(*columns, stop_distance=numbers[0])
+        curvature, grade, bank, limit = (tuple(numbers[1 + k * n : 1 + (k + 1) * n]) for k in range(4))
+        return cls(curvature, grade, bank, limit, numbers[0])
 
 
 CONTROLS_SIZE: Final = len(Controls._fields)
