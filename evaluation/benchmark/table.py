@@ -29,6 +29,8 @@ BENCHMARK_POLICIES: Final = (
     "learned-ppo-now",
     "learned-perceived",
     "learned",
+    "learned-controls",
+    "learned-road",
     "mpc-preview",
     "nmpc-preview",
     "mpc-full",
