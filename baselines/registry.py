@@ -45,7 +45,7 @@ POLICIES: Final[Registry[Factory]] = Registry(
 POLICY_FILES: Final[Registry[Reader]] = Registry("policy file", "motion_cueing.policy_files")
 """What reads a policy's file, by the ending of its name without the dot."""
 
-_DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "est1", "brk")
+_DEFAULT: Final = ("no-motion", "classical", "classical-tuned", "optimal-washout-tuned", "est1", "brk")
 
 
 register = POLICIES.register
@@ -192,7 +192,7 @@ def _no_motion(platform: Platform) -> Policy:
 def _washout(name: str, platform: Platform) -> Policy:
     from .washout import load_parameters, make_washout
 
-    return make_washout(load_parameters(name), platform.cab)
+    return make_washout(load_parameters(name, platform.name), platform.cab)
 
 
 def _mpc(name: str, platform: Platform) -> Policy:

@@ -60,8 +60,9 @@ class TuneCommand:
     """Search with CMA-ES, or, classical only, along the gradient of J through the machine's equations."""
     maneuvers: Names = ("train",)
     """Maneuvers and recordings, by name or cue CSV file; `train` for random drives."""
-    limits: Literal["roads", "all"] = "roads"
-    """Where no limit of the machine may be met: on roads, or also on tracks, circuits and sliding tires."""
+    limits: Literal["none", "roads", "all"] = "roads"
+    """Where no limit of the machine may be met: none (J alone counts), roads, or also on tracks,
+    circuits and sliding tires."""
     drives: Whole | None = None
     """Random drives, each of a minute; default: 256."""
     hours: float | None = None
@@ -224,7 +225,9 @@ def _search(record: Record, command: TuneCommand, goes_on: bool) -> Search:
 
 
 def _spared(options: TuningOptions, drives: list[CueTrace]) -> list[int]:
-    """The random drives in which limits may be met."""
+    """The drives in which limits may be met."""
+    if options.limits == "none":
+        return list(range(len(drives)))
     spared = [i for i, drive in enumerate(drives) if drive.source in _SPARED]
     return spared if options.limits == "roads" else []
 

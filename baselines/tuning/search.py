@@ -48,9 +48,9 @@ class TuningOptions:
         objective: J, or perceived J.
         method: "cma", or "gradient" through the machine's own equations, for a classical washout.
         maneuvers: "train" for random drives, or names of maneuvers and recordings.
-        limits: Drives in which no limit may be met: "all", or "roads", which exempts the random drives on
-            tracks and circuits and those at the limit of the tires. A set that takes the hardest of those
-            without a limit is a timid one on every road.
+        limits: Drives in which no limit may be met: "all"; "roads", which exempts the random drives on
+            tracks and circuits and those at the limit of the tires; or "none". A set that takes the
+            hardest of those without a limit is a timid one on every road.
         drives: Number of random drives, if any.
         duration: Length of each, s.
         roads: Distribution of the random drives, or its name.
@@ -64,7 +64,7 @@ class TuningOptions:
     objective: Measure = "J"
     method: Literal["cma", "gradient"] = "cma"
     maneuvers: Annotated[tuple[str, ...], Field(min_length=1)] = (TRAIN,)
-    limits: Literal["roads", "all"] = "roads"
+    limits: Literal["none", "roads", "all"] = "roads"
     drives: Annotated[int, Field(ge=1)] = 256
     duration: Positive = 60.0
     roads: NamedDrives = ROADS

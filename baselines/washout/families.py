@@ -173,8 +173,12 @@ def family_presets() -> list[str]:
     return [name for family in FAMILIES for name in preset_names(FAMILIES[family].presets)]
 
 
-def load_parameters(name: str | Path) -> Any:
+def load_parameters(name: str | Path, platform: str | None = None) -> Any:
     """A parameter set of any family, by preset name or from a YAML file.
+
+    Args:
+        name: Of the preset or the file.
+        platform: Name of a motion base, whose own set of this name is taken where one was tuned for it.
 
     Raises:
         UnknownNameError: no preset has this name.
@@ -187,7 +191,8 @@ def load_parameters(name: str | Path) -> Any:
         return from_dict(kind, named(kind, values, name), str(name))
     for family in map(FAMILIES.__getitem__, FAMILIES):
         if str(name) in preset_names(family.presets):
-            return load(family.parameters, family.presets / f"{name}.yaml")
+            own = family.presets / str(platform) / f"{name}.yaml"
+            return load(family.parameters, own if own.is_file() else family.presets / f"{name}.yaml")
     raise UnknownNameError("washout preset", str(name), family_presets())
 
 

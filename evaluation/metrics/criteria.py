@@ -21,7 +21,7 @@ class References:
         perceived_optimum: The policy with the lowest perceived J there is, score 1 of the perceived J.
     """
 
-    baseline: str = "classical-tuned"
+    baseline: str = "optimal-washout-tuned"
     optimum: str = "optimum"
     perceived_optimum: str = "optimum-perceived"
 

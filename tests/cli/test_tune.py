@@ -89,6 +89,7 @@ def test_random_drives_near_the_cars_limits_are_spared_unless_all_are_named():
     assert fierce < set(kinds)
     assert _spared(options, drives) == [i for i, kind in enumerate(kinds) if kind in fierce]
     assert _spared(replace(options, limits="all"), drives) == []
+    assert _spared(replace(options, limits="none"), drives) == list(range(len(drives)))
 
 
 def test_ctrl_c_keeps_the_search_and_resume_ends_where_it_would_have(words, tmp_path, monkeypatch, capsys):

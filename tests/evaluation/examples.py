@@ -11,7 +11,13 @@ from .synthetic import drive
 
 ORIGIN = Provenance("motion-cueing evaluate", "2026-01-01T00:00:00+00:00", {}, "paper", "sedan", {})
 
-GAINS = {"no-motion": 0.0, "mpc": 0.85, "classical-tuned": 0.6, "optimum-perceived": 0.93, "optimum": 0.95}
+GAINS = {
+    "no-motion": 0.0,
+    "mpc": 0.85,
+    "optimal-washout-tuned": 0.6,
+    "optimum-perceived": 0.93,
+    "optimum": 0.95,
+}
 """Gain of a made-up simulator for each policy."""
 
 

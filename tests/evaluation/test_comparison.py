@@ -141,8 +141,8 @@ def test_without_a_gap_there_is_no_score(baseline, optimum):
 
 def test_j_and_the_perceived_j_have_optima_of_their_own():
     found = normalized_scores(
-        {"classical-tuned": 4.0, "mpc": 2.0, "optimum": 1.0, "optimum-perceived": 1.5},
-        {"classical-tuned": 8.0, "mpc": 5.0, "optimum": 3.0, "optimum-perceived": 2.0},
+        {"optimal-washout-tuned": 4.0, "mpc": 2.0, "optimum": 1.0, "optimum-perceived": 1.5},
+        {"optimal-washout-tuned": 8.0, "mpc": 5.0, "optimum": 3.0, "optimum-perceived": 2.0},
         References(),
     )
     assert found["mpc"] == NormalizedScore(2.0 / 3.0, 0.5)

@@ -98,7 +98,7 @@ def _values(p: AdaptiveParameters, cab: Cab, dt: float) -> Any:
 
 _SPEED: Final = (0.001, 10.0)
 """1/s; from a gain that hardly moves in a drive to one that follows every cue."""
-_DEPARTURE: Final = (0.03, 3.0)
+_DEPARTURE: Final = (0.003, 30.0)
 _ANGLE: Final = (0.02, 100.0)
 """rad; the turntable has no end."""
 

@@ -168,25 +168,25 @@ def kernel_parameters(p: WashoutParameters, cab: Cab) -> Any:
 
 _SCALES: Final = (0.2, 1.2)
 """From a fifth of the car's cue to a fifth more than it."""
-_FORCE_LIMITS: Final = (0.5, 10.0)
-"""From the threshold of perception to the limit of a tire, m/s^2."""
-_RATE_LIMITS: Final = (math.radians(3.0), 1.5)
+_FORCE_LIMITS: Final = (0.5, 30.0)
+"""From the threshold of perception to beyond any tire or rough road, m/s^2."""
+_RATE_LIMITS: Final = (math.radians(3.0), 5.0)
 """From the threshold of perception to beyond any road, rad/s."""
-_DAMPING: Final = (0.4, 2.0)
-"""From a quarter of overshoot to two real poles a factor of 14 apart."""
+_DAMPING: Final = (0.3, 4.0)
+"""From a third of overshoot to two real poles a factor of 62 apart."""
 _ROTATION: Final = (0.001, 2.5)
 """rad/s; up to the set of shoarai/washout. The turntable has no end: yaw need not return within a drive."""
-_TRANSLATION: Final = (0.03, 2.5)
-"""rad/s; up to Reid and Nahon's sets. Below, the machine takes more than half a minute to return."""
+_TRANSLATION: Final = (0.005, 2.5)
+"""rad/s; from a machine that hardly returns within a drive, up to Reid and Nahon's sets."""
 _HEAVE: Final = (0.1, 10.0)
 _ROLL_OFF: Final = (10.0, 200.0)
 _TILT: Final = (0.1, 20.0)
 """rad/s; published sets have up to 5, but above that only the limits on rate and acceleration count."""
-_TILT_RATE: Final = (math.radians(0.5), math.radians(5.0))
-"""Up to the largest limit in use: doi 10.1177/0037549716675955."""
-_TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(60.0))
+_TILT_RATE: Final = (math.radians(0.5), math.radians(20.0))
+"""Up to four times the largest limit in use (doi 10.1177/0037549716675955): J, not a rule, decides."""
+_TILT_ACCELERATION: Final = (math.radians(2.0), math.radians(200.0))
 _APPROACH: Final = (0.5, 50.0)
-_SPLIT: Final = (0.3, 60.0)
+_SPLIT: Final = (0.1, 100.0)
 TRAVEL: Final = (0.3, 30.0)
 """m; up to where the carriage's ends no longer count."""
 CARRIAGE_SPEED: Final = (0.3, 30.0)

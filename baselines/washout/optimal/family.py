@@ -77,7 +77,7 @@ _BANDWIDTH: Final = (0.03, 10.0)
 """rad/s; from a push that lasts half a minute to the noise of a road."""
 _RATE_ERROR: Final = (math.radians(0.3), math.radians(30.0))
 """A tenth of and ten times the indifference zone, beside that of the force, which stays."""
-_INTEGRAL: Final = (1.0, 1000.0)
+_INTEGRAL: Final = (0.1, 10000.0)
 _TILT_SPEED: Final = (math.radians(0.5), 10.0)
 _ACCELERATION: Final = (0.3, 100.0)
 _TILT_PUSH: Final = (0.03, 30.0)

@@ -25,6 +25,7 @@ from motion_cueing.baselines.washout import (
     load_washout,
     washout_presets,
 )
+from motion_cueing.baselines.washout.families import load_of
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.maneuvers import drive_seeds
 from motion_cueing.envs.platform import get_platform
@@ -62,6 +63,16 @@ def test_a_place_is_a_parameter_set_and_back(place):
     for coordinate in SPACE.coordinates:
         value = coordinate.value(0.0), coordinate.value(1.0)
         np.testing.assert_allclose(value, (coordinate.low, coordinate.high), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", sorted(FAMILIES))
+def test_every_end_of_every_range_is_a_washout(name):
+    space = WashoutSpace(load_of(name, FAMILIES[name].start))
+    for index in range(len(space)):
+        for end in (0.0, 1.0):
+            places = np.full(len(space), 0.5)
+            places[index] = end
+            assert space.encode(space.decode(places)) == pytest.approx(places)
 
 
 @pytest.mark.parametrize("name", washout_presets())

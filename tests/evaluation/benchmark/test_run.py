@@ -32,9 +32,9 @@ def results(outcome, splits=None, **more):
 
 
 def test_every_drive_has_the_metrics_of_a_rollout_of_it(tmp_path):
-    found = run_benchmark(request(tmp_path, "classical-tuned", "learned"))
+    found = run_benchmark(request(tmp_path, "optimal-washout-tuned", "learned"))
     assert found.driven == 4
-    for name in ("classical-tuned", "learned"):
+    for name in ("optimal-washout-tuned", "learned"):
         drives = found.platforms["paper"][name].runs[0].drives["small"]
         for cues in small_split().cues.values():
             alone = measure(rollout(make_policy(name, PAPER), cues, PAPER))
@@ -51,7 +51,9 @@ def test_what_is_done_is_not_driven_again(tmp_path):
     again = run_benchmark(request(tmp_path, "no-motion", "classical"))
     assert (first.driven, again.driven) == (4, 0)
     assert first.platforms == again.platforms
-    more = run_benchmark(request(tmp_path, "no-motion", "classical-tuned", splits=[small_split(drives=3)]))
+    more = run_benchmark(
+        request(tmp_path, "no-motion", "optimal-washout-tuned", splits=[small_split(drives=3)])
+    )
     # One more drive of the first policy, three of the new one.
     assert more.driven == 4
     changed = run_benchmark(request(tmp_path, "no-motion", splits=[small_split(strength=1.1)]))
@@ -93,7 +95,7 @@ def test_a_drive_that_fails_costs_no_other(tmp_path):
 
 @pytest.mark.slow
 def test_processes_drive_what_one_process_drives(tmp_path):
-    names = ("classical-tuned", "mpc-preview")
+    names = ("optimal-washout-tuned", "mpc-preview")
     here = run_benchmark(request(tmp_path / "here", *names))
     there = run_benchmark(request(tmp_path / "there", *names, workers=2))
     assert there.finished
@@ -153,7 +155,7 @@ def test_a_policy_states_what_it_knows(tmp_path):
 
 
 def test_results_are_written_and_read(tmp_path):
-    outcome = run_benchmark(request(tmp_path, "no-motion", "classical-tuned"))
+    outcome = run_benchmark(request(tmp_path, "no-motion", "optimal-washout-tuned"))
     found = results(outcome)
     found.save_json(tmp_path / "benchmark.json")
     read = BenchmarkResults.load_json(tmp_path / "benchmark.json")

@@ -36,5 +36,5 @@ def test_every_threshold_has_its_default_and_meaning():
     assert list(rows) == [field.name for field in fields(Criteria)]
     assert rows["indifference_force"][0] == "0.6"
     assert rows["force_threshold"][0] == "0.17, 0.17, 0.28"
-    assert rows["references"][0] == "`classical-tuned`, `optimum`, `optimum-perceived`"
+    assert rows["references"][0] == "`optimal-washout-tuned`, `optimum`, `optimum-perceived`"
     assert all(meaning for _, meaning in rows.values())

@@ -30,7 +30,7 @@ from ..examples import GAINS, ORIGIN, results_of
 from ..synthetic import drive
 
 DRIVES = {
-    "classical-tuned": drive(policy="classical-tuned"),
+    "optimal-washout-tuned": drive(policy="optimal-washout-tuned"),
     "no-motion": drive(gain=0.0, policy="no-motion"),
 }
 
@@ -107,7 +107,7 @@ def test_a_figure_leaves_no_global_state_and_its_picture_has_ink_in_every_panel(
     assert dict(mpl.rcParams) == before
     height, width, _ = picture.shape
     assert width == 1050
-    color = 255.0 * np.array(to_rgb(STYLES["classical-tuned"]["color"]))
+    color = 255.0 * np.array(to_rgb(STYLES["optimal-washout-tuned"]["color"]))
     for axes in figure.axes:
         box = axes.get_position()
         rows = slice(round(height * (1.0 - box.y1)), round(height * (1.0 - box.y0)))
@@ -126,12 +126,12 @@ def test_the_pdf_holds_lines_and_letters_and_no_picture(tmp_path):
 
 
 def test_a_figure_of_a_maneuver_shows_the_normalized_score():
-    drives = {name: drive(GAINS[name], policy=name) for name in ("classical-tuned", "optimum", "mpc")}
+    drives = {name: drive(GAINS[name], policy=name) for name in ("optimal-washout-tuned", "optimum", "mpc")}
     axes = maneuver_figure(drives).axes[-1]
     texts = {text.get_text().partition("\n")[0]: text for text in axes.texts}
     errors = {name: measure(one).cue_error for name, one in drives.items()}
     for name, error in errors.items():
-        score = normalized_score(error, errors["classical-tuned"], errors["optimum"])
+        score = normalized_score(error, errors["optimal-washout-tuned"], errors["optimum"])
         assert texts[name].get_text() == f"{name}\n{error:.2f} ({score:.2f})"
     heights = sorted(text.get_position()[1] for text in axes.texts)
     assert min(np.diff(heights)) > 0.39
@@ -147,11 +147,11 @@ def test_labels_beside_a_panel_lie_apart_and_below_its_title(heights):
 
 
 def test_a_figure_shows_four_policies_the_references_and_the_best():
-    gains = {f"p{i}": 0.02 * i for i in range(10)} | {"classical-tuned": 0.0, "optimum": 0.1}
+    gains = {f"p{i}": 0.02 * i for i in range(10)} | {"optimal-washout-tuned": 0.0, "optimum": 0.1}
     drives = {name: drive(gain, policy=name) for name, gain in gains.items()}
-    assert shown_policies(drives, Criteria()) == ["classical-tuned", "optimum", "p9", "p8"]
+    assert shown_policies(drives, Criteria()) == ["optimal-washout-tuned", "optimum", "p9", "p8"]
     labels = [line.get_label() for line in maneuver_figure(drives, list(drives)).axes[0].lines]
-    assert labels == ["classical-tuned", "optimum", "p9", "p8", "car"]
+    assert labels == ["optimal-washout-tuned", "optimum", "p9", "p8", "car"]
     chosen = maneuver_figure(drives, ["p1", "p3"]).axes[0].lines
     assert [line.get_label() for line in chosen] == ["p1", "p3", "car"]
 

@@ -36,7 +36,7 @@ DRIVES = {
     "weave": {name: drive(gain, policy=name) for name, gain in {**GAINS, MARKUP: 0.5}.items()},
     "peak": {
         name: _with_a_peak(name, 0.01 * i) for i, name in enumerate([*GAINS, MARKUP])
-    } | {"classical-tuned": _with_a_peak("classical-tuned", 30.0)},
+    } | {"optimal-washout-tuned": _with_a_peak("optimal-washout-tuned", 30.0)},
 }  # fmt: skip
 
 
@@ -132,7 +132,13 @@ def test_the_plots_have_the_data_of_the_results(page, results):
 
 def test_four_policies_are_shown_at_first_and_a_click_shows_another(page):
     visible = "u.found.filter((line, i) => u.series[i + 1].show).map((line) => line.policy)"
-    assert chart(page, "f_y", visible) == [None, "classical-tuned", "optimum", "optimum-perceived", "mpc"]
+    assert chart(page, "f_y", visible) == [
+        None,
+        "optimal-washout-tuned",
+        "optimum",
+        "optimum-perceived",
+        "mpc",
+    ]
     box = page.get_by_role("checkbox", name="no-motion")
     box.focus()
     page.keyboard.press("Space")
@@ -212,7 +218,7 @@ def test_an_address_leads_back_to_drive_policies_and_range(page):
     _ready(page, 1)
     assert shown_range(page) == [10.0, 20.0]
     assert page.get_by_role("checkbox", name="mpc").is_checked()
-    assert not page.get_by_role("checkbox", name="classical-tuned").is_checked()
+    assert not page.get_by_role("checkbox", name="optimal-washout-tuned").is_checked()
     assert page.get_by_role("radio", name="peak").is_checked()
 
 

@@ -49,7 +49,7 @@ def test_no_name_can_end_the_script_that_holds_it():
 def test_the_report_has_the_benchmark_and_the_metrics_as_declared(results):
     page = render(results)
     assert "Benchmark, means over 2 drives" in page
-    assert "(J of classical-tuned − J of\noptimum)" in page
+    assert "(J of optimal-washout-tuned − J of\noptimum)" in page
     assert METRICS["cue_error"].definition in page
     headers = re.findall('<th scope="col">(.*?)</th>', page)
     for one in METRICS.values():

@@ -31,7 +31,7 @@ from motion_cueing.evaluation.studies.study import Condition, identity, run_stud
 from ..synthetic import drive
 from .bends import PAPER, SEDAN, bend
 
-GAINS = {"no-motion": 0.0, "classical-tuned": 0.6, "mine": 0.8, "optimum": 0.95}
+GAINS = {"no-motion": 0.0, "optimal-washout-tuned": 0.6, "mine": 0.8, "optimum": 0.95}
 
 
 class Gain:
@@ -167,9 +167,9 @@ def test_left_out_and_failed_are_told_and_the_others_stay(roll, tmp_path):
     assert told == {(None, "gap"): "no road", ("mine", "cliff"): "RuntimeError: fell"}
     # Means are over what every policy finished.
     assert results.maneuvers == ("bend",)
-    assert set(results.summaries["paper"]) == {"no-motion", "classical-tuned", "mine"}
+    assert set(results.summaries["paper"]) == {"no-motion", "optimal-washout-tuned", "mine"}
     assert results.driven == tuple(row[0] for row in matrix_table(results, "t", False).rows)
-    assert set(results.driven) == {"no-motion", "classical-tuned", "mine"}
+    assert set(results.driven) == {"no-motion", "optimal-washout-tuned", "mine"}
     assert results.skipped_lines() == ["optimum: needs a solver"]
     partly = replace(results, conditions={**results.conditions, "other": "another machine"})
     assert partly.skipped_lines() == ["optimum, paper: needs a solver"]
@@ -208,7 +208,7 @@ def test_summaries_are_means_with_ratio_and_share(roll, tmp_path):
     whole, locked = results.summaries.values()
     metrics = results.metrics["paper"]["mine"]
     assert whole["mine"].cue_error == pytest.approx(np.mean([m.cue_error for m in metrics.values()]))
-    assert (whole["classical-tuned"].normalized_score, whole["optimum"].normalized_score) == (0.0, 1.0)
+    assert (whole["optimal-washout-tuned"].normalized_score, whole["optimum"].normalized_score) == (0.0, 1.0)
     assert whole["mine"].perceived_normalized_score is None
     assert locked["mine"].ratio == pytest.approx(locked["mine"].cue_error / whole["mine"].cue_error)
     assert locked["no-motion"].ratio == 1.0
@@ -227,7 +227,7 @@ def test_results_are_written_read_and_drawn(roll, tmp_path):
     rows = list(csv.DictReader((tmp_path / "study.csv").open()))
     assert [(row["condition"], row["policy"]) for row in rows[:2]] == [
         ("paper", "no-motion"),
-        ("paper", "classical-tuned"),
+        ("paper", "optimal-washout-tuned"),
     ]
     assert float(rows[2]["cue_error"]) == results.summaries["paper"]["mine"].cue_error
     nothing = replace(results, summaries={})
