@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -143,8 +142,8 @@ class _KnownNow:
         times = self._make.times
         if len(times) and packet.road is None and not self._allow_missing:
             raise ConfigurationError("the policy sees the road ahead, which the packets do not have")
-        columns = [np.array([value]) for value in packet.controls]
-        controls = KnownControls(*columns, np.array([True]))
+        wheel, throttle, brake, speed, slip = (np.array([value]) for value in packet.controls)
+        controls = KnownControls(wheel, throttle, brake, speed, slip, np.array([True]))
         there = np.array([packet.road is not None])
         rows, self._smooth = self._make(controls, self._ahead(packet.road), there, self._smooth)
         return np.asarray(rows[0])
@@ -152,9 +151,10 @@ class _KnownNow:
     def _ahead(self, road: Road | None) -> Ahead | None:
         if road is None:
             return None
-        at = partial(np.interp, self._make.times, ROAD_TIMES)
         columns = (road.curvature, road.grade, road.bank, road.speed_limit)
-        curvature, grade, bank, limit = (at(column)[None, :] for column in columns)
+        curvature, grade, bank, limit = (
+            np.interp(self._make.times, ROAD_TIMES, column)[None, :] for column in columns
+        )
         return Ahead(curvature, grade, bank, limit, np.array([road.stop_distance]))
 
 

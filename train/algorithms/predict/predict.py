@@ -86,9 +86,12 @@ def load_predict_config(file: str | Path | None = None, **fields: Any) -> Predic
         DataError: the file cannot be read.
         ConfigurationError: a field is unknown or wrong.
     """
-    values = read_yaml(PRESET)
+    values: Any = read_yaml(PRESET)
     if file is not None:
-        values = merge(values, read_yaml(file))
+        own = read_yaml(file)
+        if not isinstance(own, dict):
+            raise ConfigurationError(f"{file}: expected fields of PredictConfig")
+        values = merge(values, own)
     given = {name: value for name, value in fields.items() if value is not None}
     return from_dict(PredictConfig, {**values, **given}, str(file or PRESET))
 
@@ -125,7 +128,7 @@ def train_predictor(
     total = config.epochs * (count // config.batch_size)
     order = torch.Generator().manual_seed(config.seed)
     for epoch in range(config.epochs):
-        sums, parts = 0.0, torch.randperm(count, generator=order).split(config.batch_size)[:-1]
+        sums, parts = 0.0, torch.randperm(count, generator=order).split(config.batch_size)[:-1]  # type: ignore[no-untyped-call]
         for part in parts:
             for group in optimizer.param_groups:
                 group["lr"] = config.learning_rate * warm_cosine(step / max(total, 1))
