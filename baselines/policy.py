@@ -219,6 +219,9 @@ class TaskPolicy(Policy):
         if self.task.observation.machine:
             return self.on(platform)
         own = self.platform
+        # A machine that brakes more gently for its limits is the same one while it meets none.
+        if platform.braking != own.braking and replace(own, braking=platform.braking) == platform:
+            return self.on(platform)
         if own != platform:
             raise ConfigurationError(
                 f"{self.name} was made for the motion base {own.name!r}, not {platform.name!r}; take "

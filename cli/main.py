@@ -105,9 +105,9 @@ COMMANDS: Final[Mapping[str, Command]] = {
     "export": Command(
         ".export",
         "ExportCommand",
-        "write an agent as an ONNX file",
-        "--policy learned --out learned.onnx",
-        "docs/guides/export-an-agent.md says how to run the file",
+        "write an agent as an ONNX file, or a policy as C99 or an FMU",
+        "classical --set-points --c washout",
+        "docs/guides/export-an-agent.md says how to run the files",
     ),
     "convert": Command(
         ".convert",

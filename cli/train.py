@@ -22,6 +22,8 @@ _NEEDED: Final = ("torch", "stable_baselines3", "sb3_contrib", "tensorboard", "o
 _FIXED: Final = {"algorithm": "algo", "seed": "seed", "envs": "n_envs", "initial": "initial"}
 """Options that a training keeps to its end, and their fields in its configuration."""
 _ELSE: Final = "leave it out, name another --out, or add --fresh to begin anew"
+_FOR_A_PLATFORM: Final = Path("for-platform")
+"""Recipe of agents for one motion base."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +37,12 @@ class TrainingOptions:
     configuration. `predict` trains a predictor of the cues ahead, for `evaluate --preview predicted`."""
     config: Annotated[Path | None, option("FILE.yaml|NAME")] = None
     """Configuration: only what differs from the algorithm's default; or the name of a shipped agent's."""
-    initial: Annotated[Path | None, option("FILE.safetensors")] = None
+    platform: Annotated[
+        str | None, option("NAME|FILE.yaml", alias="--for", completer=named("Motion bases"))
+    ] = None
+    """Motion base that the agent is for, by name or file. Without --config an agent for any motion base,
+    without preview, is trained on for this one: some ten minutes of one core."""
+    initial: Annotated[str | None, option("NAME|FILE.safetensors")] = None
     """Agent whose network the training begins with, with the same observation and action."""
     steps: Whole | None = None
     """Actions in all, over all environments, such as 1e6; default: as the configuration says, like the next
@@ -280,13 +287,25 @@ def new_config(command: TrainingOptions, **others: Any) -> TrainingConfig:
 
     return load_config(
         command.algorithm,
-        command.config,
+        _config(command),
         steps=command.steps,
         seed=command.seed,
         n_envs=command.envs,
-        initial=None if command.initial is None else str(command.initial),
+        initial=command.initial,
+        task=_task(command),
         **others,
     )
+
+
+def _config(command: TrainingOptions) -> Path | None:
+    """The file or recipe; for a motion base alone that of agents for one motion base."""
+    if command.platform is not None and command.config is None and command.algorithm is None:
+        return _FOR_A_PLATFORM
+    return command.config
+
+
+def _task(command: TrainingOptions) -> dict[str, str] | None:
+    return None if command.platform is None else {"platform": command.platform}
 
 
 def goes_on(command: TrainingOptions, kind: str) -> bool:
@@ -334,15 +353,14 @@ def check_same(command: TrainingOptions, begun: TrainingConfig) -> None:
         given, was = getattr(command, flag), getattr(begun, name)
         if given is not None and str(given) != str(was):
             raise ConfigurationError(f"--{flag} {given}: {command.out} was begun with {was}; {_ELSE}")
-    if command.config is None:
+    if command.config is None and command.platform is None:
         return
     fixed = {name: getattr(begun, name) for name in ("steps", "seed", "n_envs", "initial")}
     fixed["population"] = to_dict(begun.population)
-    given = load_config(command.algorithm, command.config, **fixed)
+    given = load_config(command.algorithm, _config(command), task=_task(command), **fixed)
     other = [
         field.name for field in fields(begun) if getattr(given, field.name) != getattr(begun, field.name)
     ]
     if other:
-        raise ConfigurationError(
-            f"--config {command.config}: {command.out} was begun with another {', '.join(other)}; {_ELSE}"
-        )
+        flag = f"--for {command.platform}" if command.config is None else f"--config {command.config}"
+        raise ConfigurationError(f"{flag}: {command.out} was begun with another {', '.join(other)}; {_ELSE}")

@@ -146,7 +146,7 @@ class TrainingConfig:
         base: What acts under the agent, where ``task.action.mode`` needs that: parameters of a washout, or
             the name or file of a washout, predictive control or an agent; default: ``task.action.base``,
             or "classical".
-        initial: Agent file whose network the training begins with; it sees and does the same.
+        initial: Agent, by file or name, whose network the training begins with; it sees and does the same.
         hyperparameters: Arguments of the algorithm.
         normalize: Running normalization.
         n_envs: Environments stepped together.

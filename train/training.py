@@ -25,7 +25,7 @@ from ..envs.task.batch import Batch
 from ..envs.task.episode import platform_of
 from ..envs.task.kernels.observation import layout_of
 from .agents import Agent, PolicyNetwork, Record
-from .agents.agent import DEFAULT, base_of
+from .agents.agent import DEFAULT, base_of, find_agent
 from .config import Measure, TrainingConfig
 from .logs import TrainingLog
 from .networks import Actor, start_as_spring_damper
@@ -37,7 +37,7 @@ from .watch import References, Watch
 
 def initial_agent(config: TrainingConfig) -> Agent | None:
     """The agent of ``config.initial``, or None where nothing is named."""
-    return None if config.initial is None else Agent.load(config.initial)
+    return None if config.initial is None else find_agent(config.initial)
 
 
 def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
@@ -53,7 +53,9 @@ def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
     ours, own = config.task.observation, agent.task.observation
     added = replace(own, controls=ours.controls, road=ours.road, allow_missing=ours.allow_missing)
     widens = added == ours and own.stack == 1 and not agent.network.lstm
-    for name in ("platform", "action", *(() if widens else ("observation",))):
+    # An agent that observes its machine begins on any.
+    same = ["action", *([] if own.machine else ["platform"]), *([] if widens else ["observation"])]
+    for name in same:
         theirs, asked = getattr(agent.task, name), getattr(config.task, name)
         if theirs != asked:
             raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {asked}")

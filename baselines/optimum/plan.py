@@ -118,6 +118,9 @@ def key_of(
     machine = to_dict(platform)
     for name in ("name", "description"):
         del machine[name]
+    if platform.braking.jerk is None:
+        # Plans of before this option stay valid.
+        del machine["braking"]
     settings = [FORMULATION, machine, to_dict(options), to_dict(vestibular), round(cues.dt, 9)]
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
     for values in (cues.specific_force, cues.angular_velocity, cues.angular_acceleration, start):

@@ -1,7 +1,7 @@
 """The motion base: carriage, hexapod, turntable, their limits and kinematics."""
 
 from .kinematics import legs_of_pose, pose_of_legs
-from .machines import Cab, Carriage, Hexapod, Platform, Turntable, actuator_limits
+from .machines import Braking, Cab, Carriage, Hexapod, Platform, Turntable, actuator_limits
 from .presets import (
     ablation_names,
     ablations,
@@ -13,6 +13,7 @@ from .presets import (
 )
 
 __all__ = [
+    "Braking",
     "Cab",
     "Carriage",
     "Hexapod",

@@ -151,6 +151,22 @@ class Cab:
 
 
 @configuration
+class Braking:
+    """How gently the machine brakes for its limits: a bound on the jerk that the driver feels of it.
+
+    Carriage, hexapod and turntable each keep it by themselves, wherever there is room to: braking begins
+    earlier. A time step of 10 ms changes the felt force by a hundredth of it.
+
+    Args:
+        jerk: Greatest jerk at the driver's head from a subsystem that brakes for an end of travel or its
+            speed limit, m/s^3; 150 is a good choice. None: it brakes with full acceleration, at the last
+            moment. That is the default, as the offline optimum plans so.
+    """
+
+    jerk: Positive | None = None
+
+
+@configuration
 class Platform:
     """A whole machine: any subsystem but the hexapod may be missing.
 
@@ -161,6 +177,7 @@ class Platform:
         carriage: The x-y carriage, or None.
         turntable: The turntable, or None.
         cab: Where the driver sits.
+        braking: How gently limits hold the machine back.
     """
 
     name: str
@@ -169,6 +186,7 @@ class Platform:
     carriage: Carriage | None = None
     turntable: Turntable | None = None
     cab: Cab = Cab()
+    braking: Braking = Braking()
 
     def without_carriage(self) -> Platform:
         """The same machine with its carriage locked at 0."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import product
+from typing import Any, Final
 
 import numpy as np
 import warp as wp
@@ -55,6 +56,36 @@ def _dynamics(platform: Platform) -> list[ActuatorDynamics]:
     ]
 
 
+_CORNERS: Final = np.array(list(product((-1.0, 1.0), repeat=6)))
+"""Every combination of the ways that six legs go."""
+
+_SHORTEST_ARM: Final = 0.1
+"""Of the head about the turntable's axis, m: a turntable right below it may not turn with any jerk."""
+
+
+def braking_jerk(platform: Platform) -> NDArray[np.float64]:
+    """(9,) jerk of each actuator with which limits brake, m/s^3 and rad/s^3; 0 for any.
+
+    With all actuators of a subsystem at it, in the worst combination of signs, the force at the cab's
+    reference point and at the head changes at no more than the felt jerk of the platform's ``braking``. This
+    is reckoned at neutral.
+    """
+    felt = platform.braking.jerk
+    if felt is None:
+        return np.zeros(9)
+    cab = np.array(platform.cab.reference_point)
+    points = [cab, cab + np.array(platform.cab.head)]
+    of_legs = np.linalg.inv(neutral_jacobian(platform.hexapod))
+    legs = max(
+        np.linalg.norm(
+            _CORNERS @ (of_legs[:3] - np.cross(point, of_legs[3:], axisb=0, axisc=0)).T, axis=1
+        ).max()
+        for point in points
+    )
+    arm = max(_SHORTEST_ARM, *(float(np.hypot(*point[:2])) for point in points))
+    return felt / np.array([np.sqrt(2.0)] * 2 + [legs] * 6 + [arm])
+
+
 def machine_parameters(platform: Platform, dt: float) -> Any:
     """The kernel's :class:`~.state.Machine` of a platform at a time step, s.
 
@@ -68,6 +99,8 @@ def machine_parameters(platform: Platform, dt: float) -> Any:
     machine.far_from_singular = FAR_FROM_SINGULAR if braking_stays_clear(platform.hexapod) else np.inf
     for name, values in limits_of(platform).items():
         setattr(machine, name, vec9(*values))
+    machine.jerk = vec9(*braking_jerk(platform))
+    machine.felt_jerk = platform.braking.jerk or 0.0
     cab = np.array(platform.cab.reference_point)
     machine.cab = vec3(*cab)
     machine.head = vec3(*(cab + np.array(platform.cab.head)))

@@ -27,6 +27,7 @@ BENCHMARK_POLICIES: Final = (
     "mpc",
     "nmpc",
     "learned-ppo-now",
+    "learned-any-now",
     "learned-perceived",
     "learned",
     "learned-controls",

@@ -9,21 +9,24 @@ import re
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from motion_cueing.cli import train as train_command
 from motion_cueing.cli.main import main
 from motion_cueing.envs.errors import ConfigurationError
-from motion_cueing.envs.settings import load
+from motion_cueing.envs.platform import get_platform
+from motion_cueing.envs.settings import load, to_dict
 from motion_cueing.envs.task.kernels.reward import TERMS
 from motion_cueing.train import training as interrupt
 from motion_cueing.train.agents import Agent
 from motion_cueing.train.config import TrainingConfig
 from motion_cueing.train.run import RunFolder, checkpoints_in
-from motion_cueing.train.training import Training
+from motion_cueing.train.training import Training, initial_network
 
 from ..train import tiny
 
@@ -228,6 +231,27 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
         Path(f"{name}.yaml").write_text(text)
     assert message in complaint(words, capsys)
     assert {path.name for path in tmp_path.iterdir()} == {f"{name}.yaml" for name in files}
+
+
+def test_an_agent_for_a_machine_of_ones_own_goes_on_from_one_for_any(tmp_path):
+    mine = tmp_path / "mine.yaml"
+    platform = replace(get_platform("24-inch"), name="mine")
+    mine.write_text(yaml.safe_dump(to_dict(platform)), encoding="utf-8")
+    command = train_command.TrainCommand(platform=str(mine), steps=1000)
+    config = train_command.new_config(command)
+    assert (config.algo, config.initial, config.steps) == ("apg", "learned-any-now", 1000)
+    assert config.task.platform == platform
+    assert config.task.randomization.platform is None
+    assert initial_network(config) is not None
+    # Another configuration may be for the machine, too.
+    other = train_command.new_config(replace(command, config=Path("learned")))
+    assert (other.initial, other.task.platform) == (None, platform)
+    wrong = replace(other, initial="learned")
+    with pytest.raises(ConfigurationError, match=r"initial learned: its task\.platform is"):
+        initial_network(wrong)
+    RunFolder.create(tmp_path / "run", config)
+    with pytest.raises(ConfigurationError, match=r"--for paper: .* was begun with another task"):
+        train_command.check_same(replace(command, platform="paper", out=tmp_path / "run"), config)
 
 
 def test_a_missing_package_is_told(monkeypatch):

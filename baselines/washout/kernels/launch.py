@@ -155,6 +155,8 @@ class Kernels:
         predict: Kernel from observations, see :func:`predict_kernel`.
         drive_through: Kernel fused with the machine, see :func:`drive_kernel`.
         act: Kernel with adjoint, see :func:`act_kernel`; None for an algorithm without a gradient.
+        begin: The Warp function (parameters, reading) -> memory when an episode begins.
+        step: The Warp function (parameters, memory, reading, dt) -> a struct with ``action`` and ``memory``.
     """
 
     parameters: Any
@@ -163,6 +165,8 @@ class Kernels:
     predict: Any
     drive_through: Any
     act: Any
+    begin: Any
+    step: Any
 
 
 def make_kernels(
@@ -181,4 +185,6 @@ def make_kernels(
         predict_kernel(parameters, memory, begin, step),
         drive_kernel(parameters, begin, step),
         act_kernel(parameters, memory, begin, step) if differentiable else None,
+        begin,
+        step,
     )

@@ -16,6 +16,21 @@ The set is invariant: from every safe state a speed v' exists with |v' - v| <= A
 state again. So position, speed and acceleration limits hold together and forever, and no end of travel is
 met with a bump. Solving the condition of the next state for v' gives the bound of :func:`braking_speed`.
 
+**Braking without a kick.** Where the machine bounds the jerk J of braking, the state (q, v) after a step is
+safe at an upper end only if the actuator can stop there while its acceleration changes by at most J dt a
+step. From the acceleration a of the step, braking goes to a peak, holds -A where that is reached, and ends
+with speed and acceleration 0 together. It takes
+
+    D = (w a - a^3 / 6 + g) / J^2,  w = J v + a^2 / 2,  g = w^(3/2) up to w = A^2, then (A w + w^2 / A) / 2,
+
+and D <= q_max - A dt^2 / 8 - q is required. As a is constant within a step, it counts as J dt / 2 more than
+it is. This set is invariant, too: from each of its states a next one is reached by lowering a by no more
+than J dt. A speed limit V is approached likewise, with v + a^2 / (2 J) <= V. A command that leads to a safe
+state is followed to the last bit, whatever its jerk; else each actuator takes the nearest safe acceleration.
+From then until the command is met again, the felt force, too, goes towards it with bounded jerk, so that the
+free actuators do not jump where the held ones do not balance them. The limits of the paragraph above hold
+beside this.
+
 **Actuators.** A second-order lag and a dead time for each subsystem; none by default, as in the paper. The
 lag omega^2 / (s^2 + 2 zeta omega s + omega^2) has zeta >= 1, so its impulse response is nowhere negative:
 position, speed and acceleration of the machine are weighted means of those of the set-point, and keep every
@@ -43,6 +58,9 @@ from .geometry import (
     leg_jacobian,
     leg_rates,
     platform_rates,
+    rate_matrix,
+    rotation,
+    turntable_rotation,
 )
 
 
@@ -71,6 +89,165 @@ def rate_bounds(
 
 
 @wp.func
+def stopping_distance(speed: real, acceleration: real, greatest: real, jerk: real) -> real:
+    """Way to standstill with bounded jerk; 0 where the actuator moves away from the end and stays so.
+
+    Args:
+        speed: Towards the end.
+        acceleration: Towards it, now.
+        greatest: Acceleration limit.
+        jerk: Greatest change of acceleration over time.
+    """
+    w = jerk * speed + real(0.5) * acceleration * acceleration
+    if acceleration < real(0.0) and w < acceleration * acceleration:
+        # It brakes harder than it need: the speed is gone before the acceleration has returned to 0.
+        if speed <= real(0.0):
+            return real(0.0)
+        left = wp.sqrt(real(2.0) * (acceleration * acceleration - w))
+        gone = -acceleration - left
+        return gone * gone * (real(2.0) * left - acceleration) / (real(6.0) * jerk * jerk)
+    if w <= real(0.0):
+        return real(0.0)
+    braking = w * wp.sqrt(w)
+    if w > greatest * greatest:
+        braking = real(0.5) * (greatest * w + w * w / greatest)
+    cubic = acceleration * acceleration * acceleration / real(6.0)
+    return (w * acceleration - cubic + braking) / (jerk * jerk)
+
+
+@wp.func
+def resting_way(rate: real, acceleration: real, greatest: real, jerk: real) -> real:
+    """Way to rest with bounded jerk, with its sign: speed and acceleration end at 0 together."""
+    ahead = wp.sign(jerk * rate + real(0.5) * acceleration * wp.abs(acceleration))
+    return ahead * stopping_distance(ahead * rate, ahead * acceleration, greatest, jerk)
+
+
+@wp.func
+def resting_rate(rate: real, acceleration: real, greatest: real, jerk: real, dt: real) -> real:
+    """Rate after the next step of braking to rest with bounded jerk.
+
+    The acceleration p that returns to 0 in steps of J dt as the rate does has p^2 + p J dt = 2 J |rate|.
+    """
+    step = jerk * dt
+    speed = wp.abs(rate)
+    peak = real(0.5) * (wp.sqrt(step * step + real(8.0) * jerk * speed) - step)
+    peak = wp.min(wp.min(peak, speed / dt), greatest)
+    braking = wp.clamp(-wp.sign(rate) * peak, acceleration - step, acceleration + step)
+    return rate + wp.clamp(braking, -greatest, greatest) * dt
+
+
+@wp.func
+def stopping_slopes(speed: real, acceleration: real, greatest: real, jerk: real) -> vec2:
+    """Derivatives of :func:`stopping_distance` by speed and by acceleration."""
+    w = jerk * speed + real(0.5) * acceleration * acceleration
+    if acceleration < real(0.0) and w < acceleration * acceleration:
+        if speed <= real(0.0):
+            return vec2(real(0.0), real(0.0))
+        gone = -acceleration - wp.sqrt(real(2.0) * (acceleration * acceleration - w))
+        return vec2(gone / jerk, real(0.5) * gone * gone / (jerk * jerk))
+    if w <= real(0.0):
+        return vec2(real(0.0), real(0.0))
+    slope = acceleration + real(1.5) * wp.sqrt(w)
+    if w > greatest * greatest:
+        slope = acceleration + real(0.5) * greatest + w / greatest
+    return vec2(slope / jerk, (jerk * speed + slope * acceleration) / (jerk * jerk))
+
+
+@wp.func
+def stops_in_time(room: real, speed: real, acceleration: real, greatest: real, jerk: real, dt: real) -> bool:
+    """Whether an actuator still stops within ``room`` after a step with this acceleration."""
+    after = speed + acceleration * dt
+    left = room - real(0.5) * (speed + after) * dt
+    eased = acceleration + real(0.5) * jerk * dt
+    return left >= real(0.0) and stopping_distance(after, eased, greatest, jerk) <= left
+
+
+BISECTIONS = wp.constant(45 if real is wp.float64 else 22)
+"""Halvings of the acceleration that just stops in time: to the precision of a number."""
+
+
+@wp.func
+def eased_acceleration(room: real, speed: real, greatest: real, jerk: real, dt: real) -> real:
+    """Greatest acceleration towards an end of travel from which :func:`stops_in_time` holds.
+
+    Where none does, the one that brings the actuator to rest, as far as its limit allows.
+    """
+    least = wp.max(-greatest, -wp.max(speed, real(0.0)) / dt - real(0.5) * jerk * dt)
+    most = greatest
+    for _ in range(BISECTIONS):
+        middle = real(0.5) * (least + most)
+        if stops_in_time(room, speed, middle, greatest, jerk, dt):
+            least = middle
+        else:
+            most = middle
+    return least
+
+
+@wp.func_grad(eased_acceleration)
+def adjoint_eased_acceleration(
+    room: real, speed: real, greatest: real, jerk: real, dt: real, adjoint: real
+) -> None:
+    """Implicit function theorem: the stopping distance after the step equals the room that is left."""
+    acceleration = eased_acceleration(room, speed, greatest, jerk, dt)
+    slopes = stopping_slopes(speed + acceleration * dt, acceleration + real(0.5) * jerk * dt, greatest, jerk)
+    by_acceleration = slopes[0] * dt + slopes[1] + real(0.5) * dt * dt
+    wp.adjoint[room] += adjoint / by_acceleration
+    wp.adjoint[speed] += -adjoint * (slopes[0] + dt) / by_acceleration
+
+
+@wp.func
+def eased_speed(speed: real, velocity: real, acceleration: real, jerk: real, dt: real) -> real:
+    """Greatest speed after a step from which the speed limit is approached with bounded jerk."""
+    step = jerk * dt
+    most = wp.sqrt(step * step + real(2.0) * jerk * wp.max(velocity - speed, real(0.0))) - step
+    return speed + wp.min(most, acceleration) * dt
+
+
+@wp.func
+def eased_rate(
+    distance: real, speed: real, requested: real, velocity: real, acceleration: real, jerk: real, dt: real
+) -> real:
+    """The speed requested towards an end of travel, or the greatest that brakes with bounded jerk."""
+    room = distance - real(0.125) * acceleration * dt * dt
+    rate = wp.min(requested, eased_speed(speed, velocity, acceleration, jerk, dt))
+    # At rest within the last tenth of a millimeter: no motion is needed to stop.
+    if room < real(0.0) and speed <= real(0.0):
+        return rate
+    if not stops_in_time(room, speed, (rate - speed) / dt, acceleration, jerk, dt):
+        rate = speed + eased_acceleration(room, speed, acceleration, jerk, dt) * dt
+    return rate
+
+
+@wp.func
+def has_room(
+    q: real,
+    v: real,
+    requested: real,
+    q_min: real,
+    q_max: real,
+    velocity: real,
+    greatest: real,
+    jerk: real,
+    dt: real,
+) -> bool:
+    """Whether an actuator is so far from all limits that any braking fits: a quick test of both ends.
+
+    It takes g of the stopping distance for (A w + w^2 / A) / 2, which is never less.
+    """
+    acceleration = wp.abs(requested - v) / dt
+    eased = acceleration + real(0.5) * jerk * dt
+    speed = wp.abs(requested)
+    w = jerk * speed + real(0.5) * eased * eased
+    room = wp.min(q_max - q, q - q_min) - (wp.abs(v) + speed + greatest * dt) * dt
+    near_speed = w > jerk * velocity
+    return (
+        acceleration <= greatest
+        and not near_speed
+        and w * (eased + real(0.5) * (greatest + w / greatest)) <= room * jerk * jerk
+    )
+
+
+@wp.func
 def is_safe(q: real, v: real, q_min: real, q_max: real, acceleration: real, dt: real) -> bool:
     """Whether (q, v) lies in the safe set of both ends."""
     distance = q_max - q
@@ -80,28 +257,6 @@ def is_safe(q: real, v: real, q_min: real, q_max: real, acceleration: real, dt: 
     if v != real(0.0):
         needed = real(0.5) * v * v / acceleration + real(0.125) * acceleration * dt * dt
     return distance >= needed and q >= q_min and q <= q_max
-
-
-@wp.func
-def active_limit(
-    requested: real, q: real, v: real, q_min: real, q_max: real, velocity: real, acceleration: real, dt: real
-) -> int:
-    """Which limit holds back a requested speed: 0 none, 1 end of travel, 2 velocity, 4 acceleration."""
-    bounds = rate_bounds(q, v, q_min, q_max, velocity, acceleration, dt)
-    if requested >= bounds[0] and requested <= bounds[1]:
-        return 0
-    ahead = q_max - q
-    towards = v
-    bound = bounds[1]
-    if requested < bounds[0]:
-        ahead = q - q_min
-        towards = -v
-        bound = -bounds[0]
-    if braking_speed(ahead, towards, acceleration, dt) <= wp.min(velocity, bound):
-        return 1
-    if bound >= velocity:
-        return 2
-    return 4
 
 
 CARRIAGE = slice(0, 2)
@@ -121,6 +276,9 @@ CLOSES = wp.constant(real(1e-10 if real is wp.float64 else 1e-5))
 HELD: Final = 1 << 36
 """Bit that says an emergency stop: the legs have no pose near the last one, which is held."""
 
+EASED: Final = 1 << 37
+"""Bit that says that the command is approached with bounded jerk, as a limit holds or has let go."""
+
 _EMERGENCY_STOP: Final = HELD | 0x088888800
 
 
@@ -135,6 +293,8 @@ class Machine:
     position_max: vec9
     velocity: vec9  # m/s, rad/s
     acceleration: vec9  # m/s^2, rad/s^2
+    jerk: vec9  # with which limits brake, m/s^3, rad/s^3; 0 for any
+    felt_jerk: real  # while a limit is active, m/s^3; 0 for any
     cab: vec3  # D_o: reference point of the cab from the turntable's axis, turntable at 0
     head: vec3  # D_o + OP_SS: the driver's head
     lag: mat65  # transition of the three actuator dynamics, see actuators.py
@@ -170,7 +330,7 @@ class Step:
     motion: Motion
     limits: (
         wp.uint64
-    )  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose; HELD
+    )  # 4 bits an actuator: 1 end of travel, 2 velocity, 4 acceleration, 8 singular pose; HELD, EASED
 
 
 @wp.func
@@ -280,6 +440,22 @@ def brakes_clear(
 
 
 @wp.func
+def rests_clear(
+    m: Machine, displacement: vec3, beta: vec3, extensions: vec6, ways: vec6, least: real
+) -> bool:
+    """Whether the poses half-way and at the end of the legs' stopping ways are clear."""
+    half = real(0.5)
+    middle = forward_kinematics(m.geometry, extensions + half * ways, displacement, beta)
+    rest = forward_kinematics(
+        m.geometry,
+        extensions + ways,
+        vec3(middle[0], middle[1], middle[2]),
+        vec3(middle[3], middle[4], middle[5]),
+    )
+    return is_clear(m, middle, beta, least) and is_clear(m, rest, beta, least)
+
+
+@wp.func
 def keeps_clear(
     m: Machine,
     start: Motion,
@@ -303,30 +479,54 @@ def keeps_clear(
         return False
     if m.far_from_singular > real(1.0):
         return brakes_clear(m, start, displacement, beta, extensions, rates, least, dt)
-    halfway = extensions
-    resting = extensions
+    ways = vec6()
     for i in range(6):
-        way = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
-        halfway[i] = extensions[i] + real(0.5) * way
-        resting[i] = extensions[i] + way
-    middle = forward_kinematics(m.geometry, halfway, displacement, beta)
-    rest = forward_kinematics(
-        m.geometry, resting, vec3(middle[0], middle[1], middle[2]), vec3(middle[3], middle[4], middle[5])
-    )
-    return is_clear(m, middle, beta, least) and is_clear(m, rest, beta, least)
+        ways[i] = real(0.5) * rates[i] * wp.abs(rates[i]) / m.acceleration[i + 2]
+    return rests_clear(m, displacement, beta, extensions, ways, least)
+
+
+CLEARER = wp.constant(real(wp.static(NEARLY_SINGULAR) + 0.1))
+"""Clearance below which the platform is not let come to rest by braking with bounded jerk."""
+
+
+@wp.func
+def eases_clear(
+    m: Machine,
+    start: Motion,
+    jacobian: Jacobian,
+    displacement: vec3,
+    beta: vec3,
+    extensions: vec6,
+    rates: vec6,
+    dt: real,
+) -> bool:
+    """:func:`keeps_clear` for a platform whose legs brake with bounded jerk, and with some clearance more."""
+    if m.felt_jerk <= real(0.0):
+        return True
+    now = determinant(jacobian) / m.neutral_determinant
+    if now >= m.far_from_singular:
+        return True
+    least = wp.min(CLEARER, clearance(m, start.displacement, start.beta))
+    if now < least:
+        return False
+    ways = vec6()
+    for i in range(6):
+        k = i + 2
+        ways[i] = resting_way(rates[i], (rates[i] - start.rate[k]) / dt, m.acceleration[k], m.jerk[k])
+    return rests_clear(m, displacement, beta, extensions, ways, least)
 
 
 @wp.struct
 class Bounds:
-    """Least and greatest speed of every actuator after a step, by :func:`~.limiter.rate_bounds`."""
+    """Least and greatest speed of every actuator after a step."""
 
     lower: vec9
     upper: vec9
 
 
 @wp.func
-def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
-    """The bounds of all actuators."""
+def hard_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
+    """The bounds of all actuators, whatever the jerk."""
     lower = vec9()
     upper = vec9()
     for i in range(9):
@@ -343,16 +543,65 @@ def all_bounds(m: Machine, start: Motion, dt: real) -> Bounds:
 
 
 @wp.func
+def all_bounds(m: Machine, start: Motion, requested: vec9, dt: real) -> Bounds:
+    """The bounds of all actuators: where a requested rate needs it, those that brake with bounded jerk."""
+    hard = hard_bounds(m, start, dt)
+    lower = vec9()
+    upper = vec9()
+    for i in range(9):
+        least = hard.lower[i]
+        most = hard.upper[i]
+        q = start.position[i]
+        v = start.rate[i]
+        if m.jerk[i] > real(0.0) and not has_room(
+            q, v, requested[i], m.position_min[i], m.position_max[i],
+            m.velocity[i], m.acceleration[i], m.jerk[i], dt,
+        ):  # fmt: skip
+            up = eased_rate(
+                m.position_max[i] - q, v, requested[i], m.velocity[i], m.acceleration[i], m.jerk[i], dt
+            )
+            down = -eased_rate(
+                q - m.position_min[i], -v, -requested[i], m.velocity[i], m.acceleration[i], m.jerk[i], dt
+            )
+            if up < requested[i]:
+                most = wp.clamp(up, hard.lower[i], hard.upper[i])
+            if down > requested[i]:
+                least = wp.clamp(down, hard.lower[i], hard.upper[i])
+        lower[i] = least
+        upper[i] = most
+    bounds = Bounds()
+    bounds.lower = lower
+    bounds.upper = upper
+    return bounds
+
+
+@wp.func
 def limit_flag(m: Machine, start: Motion, bounds: Bounds, i: int, requested: real, dt: real) -> wp.uint64:
-    """The limit actuator ``i`` meets, as its four bits of :class:`Step`'s mask; none for a missing one."""
+    """The limit that actuator ``i`` meets, as its four bits of :class:`Step`'s mask.
+
+    1 end of travel, 2 velocity, 4 acceleration; 0 for none, and for a missing actuator.
+    """
     if (requested >= bounds.lower[i] and requested <= bounds.upper[i]) or m.position_max[i] <= m.position_min[
         i
     ]:
         return wp.uint64(0)
-    code = active_limit(
-        requested, start.position[i], start.rate[i], m.position_min[i], m.position_max[i],
-        m.velocity[i], m.acceleration[i], dt,
-    )  # fmt: skip
+    ahead = m.position_max[i] - start.position[i]
+    towards = start.rate[i]
+    bound = bounds.upper[i]
+    if requested < bounds.lower[i]:
+        ahead = start.position[i] - m.position_min[i]
+        towards = -towards
+        bound = -bounds.lower[i]
+    code = 4
+    if bound >= m.velocity[i]:
+        code = 2
+    if m.jerk[i] > real(0.0) and bound < towards + m.acceleration[i] * dt:
+        # Braking for the speed limit gives this bound, braking for the end a lower one.
+        code = 2
+        if bound < eased_speed(towards, m.velocity[i], m.acceleration[i], m.jerk[i], dt):
+            code = 1
+    if braking_speed(ahead, towards, m.acceleration[i], dt) <= wp.min(m.velocity[i], bound):
+        code = 1
     return wp.lshift(wp.uint64(code), wp.uint64(4 * i))
 
 
@@ -448,26 +697,57 @@ def legs_towards(m: Machine, start: Motion, bounds: Bounds, target: Motion, rate
 
 
 @wp.func
-def limited_legs(m: Machine, start: Motion, bounds: Bounds, target: Motion, rates: vec6, dt: real) -> Step:
+def braking_rates(m: Machine, start: Motion, acceleration: vec9, dt: real) -> vec6:
+    """Leg rates after a step of braking to rest with bounded jerk.
+
+    The legs' accelerations are those that continue the platform's ``acceleration``.
+    """
+    half = real(0.5) * dt
+    velocity = start.velocity + vec3(acceleration[2], acceleration[3], acceleration[4]) * dt
+    beta_rate = start.beta_rate + vec3(acceleration[5], acceleration[6], acceleration[7]) * dt
+    displacement = start.displacement + (start.velocity + velocity) * half
+    beta = start.beta + (start.beta_rate + beta_rate) * half
+    onward = leg_rates(leg_jacobian(m.geometry, displacement, beta), velocity, beta, beta_rate)
+    rates = vec6()
+    for i in range(6):
+        k = i + 2
+        now = start.rate[k]
+        rates[i] = resting_rate(now, (onward[i] - now) / dt, m.acceleration[k], m.jerk[k], dt)
+    return rates
+
+
+@wp.func
+def limited_legs(
+    m: Machine, start: Motion, acceleration: vec9, bounds: Bounds, target: Motion, rates: vec6, dt: real
+) -> Step:
     """Legs towards their requested rates, or braking to rest where that would lead into a singular pose."""
     moved = legs_towards(m, start, bounds, target, rates, dt)
     s = moved.motion.displacement
     b = moved.motion.beta
-    jacobian = leg_jacobian(m.geometry, s, b)
     legs = legs_of(moved.motion.position)
     leg_speeds = legs_of(moved.motion.rate)
+    jacobian = leg_jacobian(m.geometry, s, b)
     if moved.limits == wp.uint64(0) and keeps_clear(m, start, jacobian, s, b, legs, leg_speeds, dt):
-        return moved
-    return legs_towards(m, start, bounds, target, vec6(), dt)
+        if eases_clear(m, start, jacobian, s, b, legs, leg_speeds, dt):
+            return moved
+        eased = legs_towards(m, start, bounds, target, braking_rates(m, start, acceleration, dt), dt)
+        s_eased = eased.motion.displacement
+        b_eased = eased.motion.beta
+        j_eased = leg_jacobian(m.geometry, s_eased, b_eased)
+        l_eased = legs_of(eased.motion.position)
+        if keeps_clear(m, start, j_eased, s_eased, b_eased, l_eased, legs_of(eased.motion.rate), dt):
+            return eased
+    # All the braking there is: the way to a singular pose was reckoned with it.
+    return legs_towards(m, start, hard_bounds(m, start, dt), target, vec6(), dt)
 
 
 @wp.func
-def limit_axes(start: Motion, bounds: Bounds, action: vec9, dt: real) -> Motion:
+def limit_axes(start: Motion, bounds: Bounds, requested: vec9, dt: real) -> Motion:
     """Carriage and turntable after the step, each within its own limits; the hexapod as it was."""
     half = real(0.5) * dt
-    x = limited_rate(bounds, 0, start.rate[0] + action[0] * dt)
-    y = limited_rate(bounds, 1, start.rate[1] + action[1] * dt)
-    t = limited_rate(bounds, 8, start.rate[8] + action[8] * dt)
+    x = limited_rate(bounds, 0, requested[0])
+    y = limited_rate(bounds, 1, requested[1])
+    t = limited_rate(bounds, 8, requested[8])
     after = start
     after.rate = joined(x, y, legs_of(start.rate), t)
     after.position = joined(
@@ -480,52 +760,80 @@ def limit_axes(start: Motion, bounds: Bounds, action: vec9, dt: real) -> Motion:
 
 
 @wp.func
-def command(m: Machine, start: Motion, action: vec9, dt: real) -> Step:
-    """The set-point after a step with nine accelerations, within all limits."""
-    half = real(0.5) * dt
-    linear = vec3(action[2], action[3], action[4])
-    angular = vec3(action[5], action[6], action[7])
-    velocity = start.velocity + linear * dt
-    beta_rate = start.beta_rate + angular * dt
-    displacement = start.displacement + (start.velocity + velocity) * half
-    beta = start.beta + (start.beta_rate + beta_rate) * half
+def command_limits(
+    m: Machine, start: Motion, bounds: Bounds, requested: vec9, clear: bool, dt: real
+) -> wp.uint64:
+    """Which limits the requested rates meet, as :class:`Step`'s mask."""
+    mask = wp.uint64(0)
+    for i in range(9):
+        if i >= 2 and i < 8 and not clear:
+            mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
+        mask = mask | limit_flag(m, start, bounds, i, requested[i], dt)
+    return mask
 
-    bounds = all_bounds(m, start, dt)
-    after = limit_axes(start, bounds, action, dt)
-    jacobian = leg_jacobian(m.geometry, displacement, beta)
-    extensions = leg_extensions(m.geometry, displacement, beta)
-    rates = leg_rates(jacobian, velocity, beta, beta_rate)
-    clear = keeps_clear(m, start, jacobian, displacement, beta, extensions, rates, dt)
-    result = Step()
-    result.limits = command_limits(m, start, bounds, action, rates, clear, dt)
-    if legs_may_follow(m, bounds, extensions, rates, dt) and clear:
-        after = with_legs(after, extensions, rates)
-        after.displacement = displacement
-        after.velocity = velocity
-        after.beta = beta
-        after.beta_rate = beta_rate
-        result.motion = after
-    else:
-        limited = limited_legs(m, start, bounds, after, rates, dt)
-        result.motion = limited.motion
-        result.limits = result.limits | limited.limits
-    return result
+
+@wp.struct
+class Request:
+    """A command before limiting: the hexapod's motion after the step, and whether the machine may follow."""
+
+    displacement: vec3
+    velocity: vec3
+    beta: vec3
+    beta_rate: vec3
+    extensions: vec6
+    rates: vec9  # of all actuators
+    bounds: Bounds
+    clear: bool  # whether it leads to no singular pose
+    limits: wp.uint64  # that it meets
 
 
 @wp.func
-def command_limits(
-    m: Machine, start: Motion, bounds: Bounds, action: vec9, requested_legs: vec6, clear: bool, dt: real
-) -> wp.uint64:
-    """Which limits a command meets, as :class:`Step`'s mask."""
-    mask = wp.uint64(0)
-    for i in range(9):
-        requested = start.rate[i] + action[i] * dt
-        if i >= 2 and i < 8:
-            requested = requested_legs[i - 2]
-            if not clear:
-                mask = mask | wp.lshift(wp.uint64(8), wp.uint64(4 * i))
-        mask = mask | limit_flag(m, start, bounds, i, requested, dt)
-    return mask
+def request(m: Machine, start: Motion, action: vec9, dt: real) -> Request:
+    """What a command asks of the machine, and which limits it meets."""
+    half = real(0.5) * dt
+    r = Request()
+    r.velocity = start.velocity + vec3(action[2], action[3], action[4]) * dt
+    r.beta_rate = start.beta_rate + vec3(action[5], action[6], action[7]) * dt
+    r.displacement = start.displacement + (start.velocity + r.velocity) * half
+    r.beta = start.beta + (start.beta_rate + r.beta_rate) * half
+    jacobian = leg_jacobian(m.geometry, r.displacement, r.beta)
+    r.extensions = leg_extensions(m.geometry, r.displacement, r.beta)
+    legs = leg_rates(jacobian, r.velocity, r.beta, r.beta_rate)
+    r.rates = joined(
+        start.rate[0] + action[0] * dt, start.rate[1] + action[1] * dt, legs, start.rate[8] + action[8] * dt
+    )
+    r.bounds = all_bounds(m, start, r.rates, dt)
+    r.clear = determinant(jacobian) / m.neutral_determinant >= m.far_from_singular
+    if not r.clear:
+        r.clear = keeps_clear(
+            m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt
+        ) and eases_clear(m, start, jacobian, r.displacement, r.beta, r.extensions, legs, dt)
+    r.limits = command_limits(m, start, r.bounds, r.rates, r.clear, dt)
+    return r
+
+
+@wp.func
+def follow(m: Machine, start: Motion, acceleration: vec9, r: Request, dt: real) -> Step:
+    """The set-point after a step: the request where the machine may, else the nearest that keeps limits.
+
+    ``acceleration`` is that of the nine axes in the step before.
+    """
+    after = limit_axes(start, r.bounds, r.rates, dt)
+    legs = legs_of(r.rates)
+    result = Step()
+    result.limits = r.limits
+    if legs_may_follow(m, r.bounds, r.extensions, legs, dt) and r.clear:
+        after = with_legs(after, r.extensions, legs)
+        after.displacement = r.displacement
+        after.velocity = r.velocity
+        after.beta = r.beta
+        after.beta_rate = r.beta_rate
+        result.motion = after
+    else:
+        limited = limited_legs(m, start, acceleration, r.bounds, after, legs, dt)
+        result.motion = limited.motion
+        result.limits = r.limits | limited.limits
+    return result
 
 
 @wp.func
@@ -538,6 +846,49 @@ def mean_acceleration(before: Motion, after: Motion, dt: real) -> vec9:
         linear[0], linear[1], linear[2], angular[0], angular[1], angular[2],
         (after.rate[8] - before.rate[8]) / dt,
     )  # fmt: skip
+
+
+@wp.func
+def felt_change(m: Machine, motion: Motion, change: vec9) -> real:
+    """Change of the specific force in the cab, m/s^2, by a change of the nine accelerations.
+
+    It is taken at the cab's reference point or at the head, where it is larger.
+    """
+    to_inertial = rotation(motion.beta)
+    up = vec3(real(0.0), real(0.0), change[8])
+    angular = to_inertial * (rate_matrix(motion.beta) * vec3(change[5], change[6], change[7]) + up)
+    linear = vec3(change[0] + change[2], change[1] + change[3], change[4])
+    table = to_inertial * turntable_rotation(motion.position[8])
+    at_cab = linear + wp.cross(angular, table * m.cab)
+    at_head = linear + wp.cross(angular, table * m.head)
+    return wp.max(wp.length(at_cab), wp.length(at_head))
+
+
+@wp.func
+def command(m: Machine, start: Motion, acceleration: vec9, limits: wp.uint64, action: vec9, dt: real) -> Step:
+    """The set-point after a step with nine accelerations, within all limits.
+
+    Args:
+        m: The machine.
+        start: The set-point before the step.
+        acceleration: Of the set-point in the step before, in the order of AXES.
+        limits: Met in the step before.
+        action: The command.
+        dt: Time step, s.
+    """
+    direct = follow(m, start, acceleration, request(m, start, action, dt), dt)
+    if m.felt_jerk <= real(0.0) or (limits | direct.limits) == wp.uint64(0):
+        return direct
+    # Limits hold an actuator, or let it go: the others must not jump either.
+    change = mean_acceleration(start, direct.motion, dt) - acceleration
+    felt = felt_change(m, start, change)
+    most = m.felt_jerk * dt
+    if felt <= most:
+        return direct
+    eased = acceleration + change * (most / felt)
+    result = follow(m, start, acceleration, request(m, start, eased, dt), dt)
+    result.limits = result.limits | direct.limits | wp.uint64(wp.static(EASED))
+    return result
 
 
 @wp.func

@@ -188,7 +188,7 @@ def next_state(
     dt: real,
 ) -> State:
     """One step of one environment with nine accelerations."""
-    commanded = command(m, state.setpoint, action, dt)
+    commanded = command(m, state.setpoint, state.setpoint_acceleration, state.limits, action, dt)
     actuated = actuate(m, state.motion, delay, environment, commanded.motion, dt)
     motion = actuated.motion
     acceleration = mean_acceleration(state.motion, motion, dt)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from motion_cueing.envs import CueTrace
 from motion_cueing.envs.arrays import FLOAT, real, vec9
-from motion_cueing.envs.platform import Platform, get_platform
+from motion_cueing.envs.platform import Braking, Platform, get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
 from motion_cueing.envs.platform.kernels.step import SetPoint
 from motion_cueing.envs.simulator.kernels.step import CueCost, State, add_cue_error, step_with_adjoint, zone
@@ -131,6 +131,33 @@ def test_gradients_through_200_steps(platform):
             expected = (sides[0] - sides[1]) / (2.0 * h)
             # A floor for what rounding leaves of a difference of costs of about 30.
             np.testing.assert_allclose(gradient[step, :, axis], expected, rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.slow
+def test_gradients_through_limits_that_brake_with_bounded_jerk():
+    simulator = Simulator(
+        replace(get_platform("paper"), braking=Braking(150.0)), drive(), drive_of=np.zeros(BATCH, dtype=int)
+    )
+    simulator.reset()
+    for _ in range(80):
+        simulator.step(np.tile([0.0, 0, 2, 0, 0, 0, 0, 0, 0], (BATCH, 1)))
+    unrolled = Unroll(simulator, 40)
+    actions = np.tile([0.1, 0.0, 1.5, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0], (40, BATCH, 1))
+    _, gradient = unrolled.gradient(actions)
+    # The legs brake for their speed limits, then for their ends.
+    assert unrolled.states[0].numpy()["limits"][0] == 0
+    assert unrolled.states[-1].numpy()["limits"][0] != 0
+    h = 1e-5
+    for step in (2, 10, 25, 38):
+        for axis in (0, 2, 6):
+            sides = []
+            for sign in (1.0, -1.0):
+                moved = actions.copy()
+                moved[step, :, axis] += sign * h
+                sides.append(unrolled.value(moved))
+            np.testing.assert_allclose(
+                gradient[step, :, axis], (sides[0] - sides[1]) / (2.0 * h), rtol=1e-5, atol=1e-7
+            )
 
 
 def test_value_and_gradient_agree_on_the_cost_and_leave_the_simulator_alone():
