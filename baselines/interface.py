@@ -24,6 +24,7 @@ from ..envs.platform.machines import Platform
 from ..envs.simulator.kernels.observation import OBSERVATION_SIZE, SLICES, observe_forward
 from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
 from ..envs.task.batch import Batch
+from ..envs.task.kernels.observation import ObservationOptions
 from ..envs.task.options import EpisodeOptions, RandomizationOptions, TaskOptions
 
 Floats = NDArray[np.float64]
@@ -92,11 +93,13 @@ class Live:
         memories: Low-passed cues of each sample, with the time constants of the low-passes, s, for each
             observation that holds some: the policy's, and that of the base policy under it.
         shown: From the car's cues to those that are written; None where they are the same.
+        known: Rows of controls and road of each sample, with what is seen of them, likewise.
     """
 
     simulator: Simulator
     memories: tuple[tuple[Mirror, tuple[float, ...]], ...] = ()
     shown: CueFilter | None = None
+    known: tuple[tuple[Mirror, ObservationOptions], ...] = ()
 
 
 class Interface(ABC):
@@ -214,7 +217,7 @@ class TaskInterface(Interface):
         self.simulator_cue_measured = task.observation.simulator_cue == "machine"
         beside = self.batch.beside
         self._batches = (self.batch,) if beside is None else (self.batch, beside)
-        self.live = tuple(Live(one.simulator, one.memories) for one in self._batches)
+        self.live = tuple(Live(one.simulator, one.memories, one.known) for one in self._batches)
         self._machine_of = np.zeros(n, dtype=np.int32)
         if machines.platform_of is not None:
             self._machine_of[...] = machines.platform_of

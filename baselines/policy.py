@@ -203,8 +203,10 @@ class TaskPolicy(Policy):
 
     @property
     def information(self) -> Information:  # type: ignore[override]
-        """The preview in its observation."""
+        """The preview, the road or the controls in its observation."""
         options = self.task.observation
+        if options.knows and not options.preview:
+            return Information("road" if options.road else "controls")
         stride = max(1, round(options.preview_spacing / TIME_STEP))
         return Information.ahead(options.preview * stride * TIME_STEP)
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter, Token
 
@@ -134,6 +134,27 @@ Fresh = Annotated[bool, Parameter(help="Begin anew instead of going on from what
 
 
 # From names and files to what they mean.
+
+
+def with_previews(
+    sources: Mapping[str, CueSource], preview: Literal["true", "held", "predicted"], predictor: str
+) -> dict[str, CueSource]:
+    """The same drives, whose previews come from somewhere else.
+
+    Raises:
+        DataError: the predictor's file is missing or broken.
+    """
+    from ..envs.predictor import find_predictor
+
+    if preview == "predicted":
+        find_predictor(predictor)
+    return {label: partial(_previewed, source, preview, predictor) for label, source in sources.items()}
+
+
+def _previewed(source: CueSource, preview: Literal["true", "held", "predicted"], predictor: str) -> CueTrace:
+    from ..envs.predictor import with_preview
+
+    return with_preview(source(), preview, predictor)
 
 
 def find_platform(name: str) -> Platform:

@@ -22,6 +22,7 @@ from .arguments import (
     PlatformName,
     PolicyNames,
     ScaleText,
+    option,
     several,
 )
 
@@ -60,6 +61,10 @@ class EvaluateCommand:
     """Version of the standard maneuvers that `all` stands for."""
     scale: ScaleText = "1"
     compensate: Compensate = False
+    preview: Literal["true", "held", "predicted"] = "true"
+    """Where policies with a preview have it from: the drive itself, the present cue, or a predictor."""
+    predictor: Annotated[str, option("NAME|FILE.safetensors")] = "road"
+    """The predictor of --preview predicted: that of the package, or the file of another one."""
     figures: bool = False
     """Draw figures for print as well, in PDF and PNG: one a maneuver, and the benchmark."""
     view: bool = False
@@ -205,10 +210,15 @@ def make_plan(command: EvaluateCommand, words: Sequence[str]) -> Plan:
         policies, missing = arguments.make_policies(command.policies, platform, make)
         skipped |= missing
         drives |= {label: partial(_drive, policy, platform, car) for label, policy in policies.items()}
-    return Plan(
-        maneuvers=cue_sources(recorded)
+    sources = (
+        cue_sources(recorded)
         if recorded
-        else at_scale(arguments.find_maneuvers(command.maneuvers, car, command.suite), scale),
+        else at_scale(arguments.find_maneuvers(command.maneuvers, car, command.suite), scale)
+    )
+    if command.preview != "true":
+        sources = arguments.with_previews(sources, command.preview, command.predictor)
+    return Plan(
+        maneuvers=sources,
         policies=drives,
         platform=platform,
         car=car,

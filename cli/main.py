@@ -189,6 +189,22 @@ COMMANDS: Final[Mapping[str, Command]] = {
         goes_on=True,
         run="run_robustness",
     ),
+    "predict": Command(
+        ".predict",
+        "PredictCommand",
+        "measure a predictor of the cues ahead by lead time",
+        "--drives 20 --out prediction",
+        "`motion-cueing evaluate --preview predicted` drives policies with it",
+    ),
+    "map-faults": Command(
+        ".studies",
+        "MapFaultsCommand",
+        "drive with wrong maps, gaps, and events that nobody announced",
+        "--policies learned learned-road --maneuvers slalom --out map-faults",
+        "look at study.png and study.md in --out",
+        goes_on=True,
+        run="run_map_faults",
+    ),
     "endure": Command(
         ".endure",
         "EndureCommand",

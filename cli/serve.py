@@ -58,6 +58,11 @@ class ServeCommand:
     platform: PlatformName = "paper"
     scale: ScaleText = "1"
     compensate: Compensate = False
+    preview: Literal["true", "held", "predicted"] = "true"
+    """Where a policy with a preview has it from: cues that are sent ahead of time, the present cue, or a
+    predictor."""
+    predictor: Annotated[str, option("NAME|FILE.safetensors")] = "road"
+    """The predictor of --preview predicted."""
     host: str = "127.0.0.1"
     """Address to listen at; 0.0.0.0 for all, so that others on the network can move the machine."""
     port: Whole = DEFAULT_PORT
@@ -247,7 +252,7 @@ def _made(command: ServeCommand) -> _Served:
     written = [load_output(file, platform, command.rate) for file in command.output]
     outputs = [(output, address_of(output.template.to, 0)) for output in written]
     policy = arguments.make_policy(command.policy, platform, command.compensate)
-    machine = make_machine(policy, platform, _VESTIBULAR)
+    machine = make_machine(policy, platform, _VESTIBULAR, command.preview, command.predictor)
     return _Served(policy, platform, machine, Controller(machine, platform, inbox, options), outputs)
 
 

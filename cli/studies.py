@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..envs.car import Car
+    from ..evaluation.reporting.text import TextTable
     from ..evaluation.studies.disturbances import Study
     from ..evaluation.studies.results import StudyResults
     from ..evaluation.studies.study import Condition, StudyOutcome
@@ -98,6 +99,30 @@ class RobustnessCommand:
     fresh: Fresh = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class MapFaultsCommand:
+    """Drive policies that see the road ahead with wrong maps, gaps, and events that nobody announced.
+
+    The drives are the same under each condition; what is known of the road is not. Without --maneuvers the
+    standard maneuvers are driven. Drives that are done are kept in the output folder and not driven again.
+    """
+
+    policies: PolicyNames = ("classical", "learned", "learned-road")
+    maneuvers: ManeuverNames = ()
+    platform: PlatformName = "paper"
+    car: CarName = "sedan"
+    low: float = 0.8
+    """Smaller factor on the curvature of the map."""
+    high: float = 1.2
+    """Larger factor on it."""
+    shift: float = 10.0
+    """Error of the place along the way, m, in either sense."""
+    gap: float = 5.0
+    """Length of a gap in the map, s; one in every 15 s."""
+    out: OutFolder = Path("map-faults")
+    fresh: Fresh = False
+
+
 def run_compare(command: CompareCommand) -> int:
     """Compare; the exit status is 1 if a drive failed."""
     from ..envs.cues import CueScale
@@ -156,6 +181,30 @@ def run_robustness(command: RobustnessCommand) -> int:
     )
 
 
+def run_map_faults(command: MapFaultsCommand) -> int:
+    """Drive everything; the exit status is 1 if a drive failed."""
+    from ..envs.maneuvers import maneuver_names
+    from ..evaluation.reporting.text import words_of
+    from ..evaluation.studies.figures import heat_figure
+    from ..evaluation.studies.roads import MapFaults, road_conditions, worst_seconds_table
+
+    platform, car = find_platform(command.platform), find_car(command.car)
+    maneuvers = find_maneuvers(command.maneuvers or tuple(maneuver_names()), car)
+    faults = MapFaults(low=command.low, high=command.high, shift=command.shift, gap=command.gap)
+    policies = find_policies(command.policies, platform)
+    prepare(command.out, command.fresh)
+    return run_and_save(
+        road_conditions(platform, car, maneuvers, faults),
+        policies,
+        command.out,
+        words_of("map-faults", command),
+        "What happens when the map is wrong?",
+        True,
+        heat_figure,
+        more=lambda results: [worst_seconds_table(results.metrics)],
+    )
+
+
 def make_study(command: RobustnessCommand) -> Study:
     """Everything but the policies, all names resolved."""
     from ..envs.maneuvers import maneuver_names
@@ -209,6 +258,7 @@ def run_and_save(
     ratios: bool,
     figure: Callable[[StudyResults], Figure | None],
     still: bool = False,
+    more: Callable[[StudyResults], Sequence[TextTable]] = lambda results: (),
 ) -> int:
     """Drive a study, print its tables, write its files.
 
@@ -221,6 +271,7 @@ def run_and_save(
         ratios: Whether J over that under the first condition stands in it.
         figure: Draws the study; None where there is nothing to draw.
         still: Whether J over that of standing still is shown.
+        more: Further tables.
 
     Returns:
         Exit status: 1 if a drive failed.
@@ -238,6 +289,7 @@ def run_and_save(
     results.save_csv(out / "study.csv")
     skipped = [f"Skipped: {line}" for line in results.skipped_lines()]
     over_still = [standstill_table(results)] if still else []
+    over_still += more(results)
     tables = [matrix_table(results, title, ratios), *over_still, *score_tables(results)]
     save_markdown(out / "study.md", *tables, *skipped)
     drawn = figure(results)

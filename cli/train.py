@@ -34,7 +34,7 @@ class TrainingOptions:
         str | None, option("NAME", alias="--algo", completer=named("Training algorithms"))
     ] = None
     """Algorithm, of those that `motion-cueing list` names; the other options change its default
-    configuration."""
+    configuration. `predict` trains a predictor of the cues ahead, for `evaluate --preview predicted`."""
     config: Annotated[Path | None, option("FILE.yaml|NAME")] = None
     """Configuration: only what differs from the algorithm's default; or the name of a shipped agent's."""
     platform: Annotated[
@@ -102,6 +102,8 @@ class PopulationCommand(TrainingOptions):
 
 def run(command: TrainCommand) -> int:
     """Train."""
+    if command.algorithm == PREDICT:
+        return _predict(command)
     from ..train.experiments import seeds as studies
 
     check(command)
@@ -115,6 +117,34 @@ def run(command: TrainCommand) -> int:
     if command.workers is not None:
         raise ConfigurationError("--workers is of use only where there are several trainings; leave it out")
     return _train(command)
+
+
+PREDICT: Final = "predict"
+"""Algorithm whose result is no agent but a predictor."""
+
+
+def _predict(command: TrainCommand) -> int:
+    """Train a predictor."""
+    from ..evaluation.reporting.text import words_of
+    from ..train.algorithms.predict.predict import load_predict_config, train_predictor
+
+    check(command)
+    useless = [
+        name
+        for name in ("initial", "steps", "envs", "workers", "address")
+        if getattr(command, name) is not None
+    ]
+    if useless or command.seeds or command.engine != "local":
+        raise ConfigurationError(
+            f"--algo predict takes --config, --seed and --out alone; leave --{(useless or ['seeds'])[0]} out"
+        )
+    config = load_predict_config(command.config, seed=command.seed)
+    out = command.out or Path("runs") / PREDICT
+    if command.fresh and out.is_dir():
+        shutil.rmtree(out)
+    train_predictor(config, out, " ".join(words_of("train", command)))
+    print(f"{out / 'predictor.safetensors'}: `motion-cueing predict` measures it")
+    return 0
 
 
 def _train(command: TrainCommand) -> int:

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ConfigurationError, DataError, reason
+from .expected import ExpectedCues
 from .limits import MOST_CELLS, MOST_COLUMNS, read_table_text
+from .road import RoadMap
 from .settings import NonNegative, configuration
 from .storage import write_bytes, write_text
 
@@ -35,6 +37,15 @@ CSV_COLUMNS: Final = (
     "angular_velocity_z_rad_s",
 )
 """Columns every cue CSV has; further numeric columns become channels."""
+
+CONTROLS: Final = (
+    "steering_wheel_rad",
+    "throttle",
+    "brake",
+    "speed_m_s",
+    "lateral_speed_m_s",
+)
+"""Channels of the driver's controls and the car's state that a policy may see."""
 
 _MOST_SAMPLES: Final = 10_000_000
 """Of a resampled trace: more than a day at 100 Hz, and about a gigabyte."""
@@ -139,9 +150,12 @@ class CueTrace:
         specific_force: (n, 3) f = a - g in F_A (x forward, y right, z down), m/s^2.
         angular_velocity: (n, 3) of the car's body in F_A, rad/s.
         angular_acceleration: (n, 3) rad/s^2; central differences of the angular velocity if not given.
-        channels: Further signals of the car, each (n,), such as ``speed_m_s``; never seen by a policy.
+        channels: Further signals of the car, each (n,), such as ``speed_m_s``. Policies see those of
+            :data:`CONTROLS`, where they are made for them, and no others.
         source: Where the trace comes from, for reports.
         scale: By which the cues have been scaled already, see :meth:`scaled`.
+        road: Road ahead: what a map and a scenario know; None where nothing is known.
+        expected: Expected cues, which policies with a preview see in place of the true ones; None for these.
 
     Raises:
         DataError: a shape is wrong, a value is not finite, or time does not advance in equal steps.
@@ -155,6 +169,8 @@ class CueTrace:
     channels: Mapping[str, Floats] = field(default_factory=dict)
     source: str = ""
     scale: CueScale = UNSCALED
+    road: RoadMap | None = None
+    expected: ExpectedCues | None = None
 
     def __post_init__(self) -> None:
         time = _checked(self.name, "time", self.time, (None,))
@@ -172,6 +188,10 @@ class CueTrace:
         object.__setattr__(self, "angular_acceleration", acceleration)
         channels = {key: _checked(self.name, key, value, (n,)) for key, value in self.channels.items()}
         object.__setattr__(self, "channels", channels)
+        if self.road is not None and len(self.road) != n:
+            raise DataError(f"{self.name}: road has {len(self.road)} samples, expected {n}")
+        if self.expected is not None and len(self.expected) != n:
+            raise DataError(f"{self.name}: expected cues have {len(self.expected)} samples, not {n}")
 
     def __len__(self) -> int:
         return len(self.time)
@@ -214,9 +234,14 @@ class CueTrace:
         """The reference at a motion scale: the one place where a drive is scaled.
 
         The channels stay: they are the car's. A neutral scale returns the trace itself.
+
+        Raises:
+            DataError: the drive carries expected cues; these come after the scale.
         """
         if scale.neutral:
             return self
+        if self.expected is not None:
+            raise DataError(f"{self.name}: a drive with expected cues cannot be scaled")
         return replace(
             self,
             specific_force=scale.of_force(self.specific_force),
@@ -241,6 +266,8 @@ class CueTrace:
             raise DataError(f"{self.name}: time step must be positive, found {dt}")
         if abs(self.dt / dt - 1.0) <= 1e-9:
             return self
+        if self.expected is not None:
+            raise DataError(f"{self.name}: a drive with expected cues keeps its time step")
         steps = self.duration / dt + 1e-9
         if not 1.0 <= steps < _MOST_SAMPLES:
             raise DataError(
@@ -261,6 +288,7 @@ class CueTrace:
             angular_velocity=at(self.angular_velocity),
             angular_acceleration=at(self.angular_acceleration),
             channels={key: at(value) for key, value in self.channels.items()},
+            road=None if self.road is None else self.road.resampled(self.time, time),
         )
 
     def to_csv(self, path: str | Path, decimals: int | None = None) -> None:

@@ -28,12 +28,13 @@ __all__ = [
 def default_policies(platform: Platform) -> list[str]:
     """Policies an evaluation compares where none is named: the baselines meant for it, and agents.
 
-    Agents are those that were made for the machine, or for any.
+    Agents are those that were made for the machine, or for any, and that any drive has enough for: not those
+    that see controls or road.
     """
     shipped = {name: agents.get_agent(name) for name in agents.agent_names()}
     fit = [
         name
         for name, agent in shipped.items()
-        if agent.task.observation.machine or agent.platform == platform
+        if (agent.task.observation.machine or agent.platform == platform) and not agent.task.observation.knows
     ]
     return [*baselines.default_policies(), *fit]

@@ -3,15 +3,17 @@
 from .controller import Controller, ControllerOptions
 from .guard import GuardOptions
 from .machine import make_machine
-from .packets import Cues, FloatsFormat, SetPoint
+from .packets import Controls, Cues, FloatsFormat, Road, SetPoint
 from .watchdog import State, WatchdogOptions
 
 __all__ = [
     "Controller",
     "ControllerOptions",
+    "Controls",
     "Cues",
     "FloatsFormat",
     "GuardOptions",
+    "Road",
     "SetPoint",
     "State",
     "WatchdogOptions",

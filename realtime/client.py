@@ -14,13 +14,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..envs.cues import CueTrace
+from ..envs.cues import CONTROLS, CueTrace
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.platform import Platform, actuator_limits
 from ..envs.platform.kernels import ACTUATORS
 from ..envs.platform.machines import limits_exceeded
+from ..envs.road import ROAD_TIMES, SLOWEST
+from ..envs.task.knowledge import controls_of
 from .inbox import Address
-from .packets import NO_SEQUENCE, Cues, Format, SetPoint
+from .packets import NO_SEQUENCE, Controls, Cues, Format, Road, SetPoint
 from .server import Endpoint
 from .timing import Histogram, Pace
 from .watchdog import State
@@ -204,6 +206,25 @@ def cues_at(trace: CueTrace, rate: int, times: int) -> Iterator[Cues]:
     """The cues of a drive, ``rate`` a second, ``times`` in a row; the sender fills in the time stamps."""
     trace = trace.resampled(1.0 / rate)
     forces, rates = trace.specific_force, trace.angular_velocity
+    controls, roads = controls_sent(trace), roads_sent(trace)
     for k in range(len(trace) * times):
         row = k % len(trace)
-        yield Cues(k, math.nan, tuple(forces[row].tolist()), tuple(rates[row].tolist()))
+        known = controls[row] if controls else None, roads[row] if roads else None
+        yield Cues(k, math.nan, tuple(forces[row].tolist()), tuple(rates[row].tolist()), False, *known)
+
+
+def controls_sent(trace: CueTrace) -> list[Controls]:
+    """The controls of each sample of a drive; none where it has no steering wheel or pedals."""
+    if any(name not in trace.channels for name in CONTROLS):
+        return []
+    return [Controls(*row) for row in np.column_stack(controls_of(trace)[:5]).tolist()]
+
+
+def roads_sent(trace: CueTrace) -> list[Road]:
+    """The road ahead of each sample of a drive; none where it has no speed or no road."""
+    if trace.road is None or "speed_m_s" not in trace.channels:
+        return []
+    speed = np.maximum(trace.channels["speed_m_s"], SLOWEST)
+    ahead = trace.road.ahead(speed[:, None] * np.array(ROAD_TIMES))
+    rows = np.column_stack((ahead.stop_distance, *ahead[:4]))
+    return [Road.of(row) for row in rows.tolist()]

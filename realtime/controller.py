@@ -30,7 +30,7 @@ from ..evaluation.trajectory import Trajectory
 from .guard import Guard, GuardOptions
 from .inbox import Inbox
 from .machine import AT_REST, LiveMachine, Track
-from .packets import NO_SEQUENCE, SetPoint
+from .packets import NO_SEQUENCE, Cues, SetPoint
 from .watchdog import BrakeOptions, BrakeToNeutral, Situation, State, WatchdogOptions, next_state
 
 Floats = NDArray[np.float64]
@@ -250,7 +250,7 @@ class Controller:
             self.guard.begin()
         begin = machine.motion
         try:
-            machine.catch_up(self._cues())
+            machine.catch_up(self._cues(), self._known())
         # A policy is a user's code: whatever it raises, the machine must return to neutral.
         except Exception as error:
             self._fail(error)
@@ -276,6 +276,10 @@ class Controller:
     def _fail(self, error: Exception) -> None:
         self.faults.append(explain(error))
         self.state = State.BRAKING
+
+    def _known(self) -> Cues | None:
+        """The packet with controls and road, while its cues are followed."""
+        return self.inbox.newest if self.state.follows and self.guard.follows else None
 
     def _cues(self) -> Floats:
         """(6,) cues for the policy: of a standing car unless it acts. They fade in when it begins."""

@@ -202,7 +202,7 @@ class Inbox:
         except DataError:
             return "malformed"
         # The numbers of a pause mean nothing, but for its time.
-        numbers = () if cues.paused else (*cues.force, *cues.rate)
+        numbers = () if cues.paused else (*cues.force, *cues.rate, *cues.known)
         if not all(map(math.isfinite, (cues.time, *numbers))):
             return "not_finite"
         if not (cues.paused or self._bounds.allow(cues.force, cues.rate)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -11,16 +12,22 @@ from numpy.typing import NDArray
 
 from ..baselines.interface import Live, Machines
 from ..baselines.policy import Policy, as_policy
-from ..envs.cues import GRAVITY, CueTrace
+from ..envs.cues import CONTROLS, GRAVITY, CueTrace
 from ..envs.errors import ActionError, ConfigurationError
+from ..envs.expected import ExpectedCues, Preview
 from ..envs.perception import VestibularModel, get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.platform.kernels.step import CARRIAGE, LEGS, TURNTABLE
+from ..envs.predictor import DEFAULT, LivePredictor, find_predictor
+from ..envs.road import ROAD_TIMES, Ahead, RoadMap, Route
 from ..envs.simulator.kernels.observation import SCALES
 from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
+from ..envs.task.kernels.observation import ObservationOptions
+from ..envs.task.knowledge import Controls as KnownControls
+from ..envs.task.knowledge import KnownRows, preview_times
 from ..evaluation.rollout import Actor
 from ..evaluation.suite import explain
-from .packets import MOTION, MOTION_SIZE
+from .packets import MOTION, MOTION_SIZE, Cues, Road
 
 Floats = NDArray[np.float64]
 
@@ -37,8 +44,12 @@ NOW: Final = 1
 def standing(ahead: int) -> CueTrace:
     """The drive whose rows :class:`LiveCues` fills: what was, what is, and ``ahead`` steps to come."""
     n = NOW + 1 + ahead
-    time = np.asarray(TIME_STEP * np.arange(n), dtype=np.float64)
-    return CueTrace("live", time, np.tile(AT_REST[:3], (n, 1)), np.zeros((n, 3)))
+    time, still, level = np.asarray(TIME_STEP * np.arange(n), dtype=np.float64), np.zeros(n), np.zeros(2)
+    road = RoadMap.of_route(Route.unknown(level, 0.0), level, None, still, still)
+    channels = dict.fromkeys(CONTROLS, still)
+    return CueTrace(
+        "live", time, np.tile(AT_REST[:3], (n, 1)), np.zeros((n, 3)), channels=channels, road=road
+    )
 
 
 class LiveCues:
@@ -48,9 +59,10 @@ class LiveCues:
 
     Args:
         live: With one environment on the CPU and the drive of :func:`standing`.
+        forecast: The expected cues, where policies see these in place of the true ones ahead.
     """
 
-    def __init__(self, live: Live) -> None:
+    def __init__(self, live: Live, forecast: LiveForecast | None = None) -> None:
         drives = live.simulator.constants[2]
         self._shown, self._newest = live.shown, AT_REST
         self._simulator = live.simulator
@@ -63,14 +75,28 @@ class LiveCues:
             for memory, constants in live.memories
             if constants
         ]
+        self._known = [_LiveKnown(rows.view, options) for rows, options in live.known if options.knows]
+        self._expected = [
+            _LiveExpected(rows.view, options, forecast.expected)
+            for rows, options in live.known
+            if forecast is not None and options.preview
+        ]
 
     @property
     def reference_cue(self) -> Floats:
         """(6,) cues of the car now."""
         return np.concatenate([self._rows[0][NOW], self._rows[1][NOW]])
 
-    def put(self, cues: Floats) -> None:
-        """Move on by a time step, with the newest cues (6,): force, m/s^2, angular velocity, rad/s."""
+    def put(self, cues: Floats, known: Cues | None = None) -> None:
+        """Move on by a time step.
+
+        Args:
+            cues: (6,) the newest: force, m/s^2, angular velocity, rad/s.
+            known: The packet with controls and road; None for a car that stands.
+
+        Raises:
+            ConfigurationError: the policy sees what the packet does not have.
+        """
         if self._shown is not None:
             self._newest = cues
             cues = self._shown.put(cues)
@@ -83,6 +109,10 @@ class LiveCues:
         scaled = self._scaled()
         for one in self._low_passes:
             one.put(scaled)
+        for rows in self._known:
+            rows.put(known)
+        for expected in self._expected:
+            expected.put(self.reference_cue)
 
     def begin(self) -> None:
         """Take the car to have moved for ever as it moves now, as at the beginning of any drive."""
@@ -97,6 +127,88 @@ class LiveCues:
     def _scaled(self) -> Floats:
         """(6,) cues of the car now, as an observation scales them."""
         return np.asarray((self.reference_cue - AT_REST) / _SCALE)
+
+
+class _KnownNow:
+    """Rows of controls and road of the present sample, of packets.
+
+    Args:
+        make: Makes the rows.
+        allow_missing: Whether packets may lack the road.
+    """
+
+    def __init__(self, make: KnownRows, allow_missing: bool) -> None:
+        self._make, self._allow_missing = make, allow_missing
+        self._smooth: Floats | None = None
+
+    def __call__(self, packet: Cues | None) -> Floats:
+        """(size,) after a time step with a packet; None for a car that stands."""
+        if packet is None:
+            self._smooth = None
+            return np.asarray(self._make(_standing_controls(), None, _NO_MAP)[0][0])
+        if packet.controls is None:
+            raise ConfigurationError("the policy sees the car's speed, which the packets do not have")
+        times = self._make.times
+        if len(times) and packet.road is None and not self._allow_missing:
+            raise ConfigurationError("the policy sees the road ahead, which the packets do not have")
+        wheel, throttle, brake, speed, slip = (np.array([value]) for value in packet.controls)
+        controls = KnownControls(wheel, throttle, brake, speed, slip, np.array([True]))
+        there = np.array([packet.road is not None])
+        rows, self._smooth = self._make(controls, self._ahead(packet.road), there, self._smooth)
+        return np.asarray(rows[0])
+
+    def _ahead(self, road: Road | None) -> Ahead | None:
+        if road is None:
+            return None
+        columns = (road.curvature, road.grade, road.bank, road.speed_limit)
+        curvature, grade, bank, limit = (
+            np.interp(self._make.times, ROAD_TIMES, column)[None, :] for column in columns
+        )
+        return Ahead(curvature, grade, bank, limit, np.array([road.stop_distance]))
+
+
+class _LiveKnown:
+    """Controls and road of the present sample, in the row that observations read.
+
+    Args:
+        rows: (samples, size) that observations read, expected cues behind them.
+        options: What is seen.
+    """
+
+    def __init__(self, rows: NDArray[Any], options: ObservationOptions) -> None:
+        make = KnownRows(options)
+        self._row, self._known = rows[NOW, : make.size], _KnownNow(make, options.allow_missing)
+
+    def put(self, packet: Cues | None) -> None:
+        """Move on by a time step, with a packet; None for a car that stands."""
+        self._row[...] = self._known(packet)
+
+
+class _LiveExpected:
+    """Expected cues of the present sample, in the row that observations read.
+
+    Args:
+        rows: (samples, size) that observations read; their last columns are the expected cues.
+        options: What is seen.
+        expected: The cues.
+    """
+
+    def __init__(self, rows: NDArray[Any], options: ObservationOptions, expected: ExpectedCues) -> None:
+        self._row, self._expected = rows[NOW, -6 * options.preview :], expected
+        self._times = preview_times(options)
+
+    def put(self, cues: Floats) -> None:
+        """Move on by a time step, with the cues (6,) of the car now."""
+        ahead = self._expected.at(cues[None], self._times, slice(NOW, NOW + 1))[0]
+        self._row[...] = ((ahead - AT_REST) / _SCALE).ravel()
+
+
+_NO_MAP: Final = np.array([False])
+
+
+def _standing_controls() -> KnownControls:
+    zero = np.zeros(1)
+    return KnownControls(zero, zero, zero, zero, zero, known=np.array([True]))
 
 
 class _LowPasses:
@@ -192,6 +304,39 @@ _WARMING: Final = 4
 """Steps that meet both copies of every state."""
 
 
+class LiveForecast:
+    """Expected cues of the present sample, in place of a preview that nobody has.
+
+    Args:
+        preview: "held" for the present cue, "predicted" for a predictor.
+        predictor: Name or file of the predictor.
+
+    Attributes:
+        expected: What policies see; its rows are all those of the present sample.
+    """
+
+    def __init__(self, preview: Preview, predictor: str = DEFAULT) -> None:
+        self._live: LivePredictor | None = None
+        leads: Floats = np.ones(1)
+        if preview == "predicted":
+            found = find_predictor(predictor)
+            self._live, leads = LivePredictor(found), found.leads
+        self.expected = ExpectedCues(leads, np.tile(AT_REST, (NOW + 1, len(leads), 1)))
+        self._known = None if self._live is None else _KnownNow(self._live.rows, allow_missing=True)
+
+    def begin(self) -> None:
+        """Forget the past."""
+        if self._live is not None:
+            self._live.begin()
+
+    def put(self, cues: Floats, packet: Cues | None) -> None:
+        """Move on by a time step, with the car's cues (6,) and the packet of controls and road."""
+        mean = self.expected.mean
+        mean[...] = cues
+        if self._live is not None and self._known is not None:
+            mean[...] = self._live(cues, self._known(packet))
+
+
 class LiveMachine:
     """One machine that moves while its cues come, and the policy that moves it.
 
@@ -204,6 +349,7 @@ class LiveMachine:
         policy: The policy, made for the machine.
         platform: The machine.
         vestibular: Perception model.
+        forecast: What policies with a preview take for it; None for cues that are sent ahead of time.
 
     Attributes:
         now: Where the machine is, with the live drive.
@@ -213,17 +359,27 @@ class LiveMachine:
         motion: (2, 15) set-point of the machine ahead, see :class:`MotionView`.
     """
 
-    def __init__(self, policy: Policy, platform: Platform, vestibular: VestibularModel) -> None:
+    def __init__(
+        self,
+        policy: Policy,
+        platform: Platform,
+        vestibular: VestibularModel,
+        forecast: LiveForecast | None = None,
+    ) -> None:
+        self._forecast = forecast
+        self.ahead_steps = 0 if forecast is not None else round(policy.information.seconds / TIME_STEP)
+        drive = standing(self.ahead_steps)
+        if forecast is not None:
+            drive = replace(drive, expected=forecast.expected)
+            policy = policy.for_drive(drive)
         self._policy = policy
-        self.ahead_steps = round(policy.information.seconds / TIME_STEP)
         # A base policy has a memory: each interface gets one of its own.
         self._now, self._ahead = (
-            policy.connect(Machines([standing(self.ahead_steps)], [platform], None, vestibular))
-            for _ in range(2)
+            policy.connect(Machines([drive], [platform], None, vestibular)) for _ in range(2)
         )
         self.now, self.ahead = self._now.simulator, self._ahead.simulator
         self._follow = self._ahead.follow(self._now)
-        self._cues = [LiveCues(one) for one in self._now.live]
+        self._cues = [LiveCues(one, forecast) for one in self._now.live]
         self._view = MotionView(self.ahead)
         self.start = np.asarray(policy.start_pose, dtype=np.float64)
         self.reset()
@@ -238,6 +394,8 @@ class LiveMachine:
 
     def begin(self) -> None:
         """The policy begins anew, from where the machine is."""
+        if self._forecast is not None:
+            self._forecast.begin()
         for cues in self._cues:
             cues.begin()
         self._now.begin(None)
@@ -249,14 +407,20 @@ class LiveMachine:
         """(6,) cues of the car now: specific force, m/s^2, and angular velocity, rad/s."""
         return self._cues[0].reference_cue
 
-    def catch_up(self, cues: Floats) -> None:
+    def catch_up(self, cues: Floats, known: Cues | None = None) -> None:
         """Take the machine to where it was a step ahead, with the car's cues (6,) there.
+
+        Args:
+            cues: Specific force, m/s^2, and angular velocity, rad/s.
+            known: The packet with controls and road; None for a car that stands.
 
         Raises:
             Exception: any error of the policy's own code; the machine is there all the same.
         """
+        if self._forecast is not None:
+            self._forecast.put(cues, known)
         for live_cues in self._cues:
-            live_cues.put(cues)
+            live_cues.put(cues, known)
         if self._last is None:
             for one in self._now.live:
                 one.simulator.reset(self.start, sample=NOW)
@@ -320,20 +484,30 @@ class LiveMachine:
         self.motion = motion
 
 
-def make_machine(policy: Any, platform: Platform, vestibular: str = "zacharias") -> LiveMachine:
+def make_machine(
+    policy: Any,
+    platform: Platform,
+    vestibular: str = "zacharias",
+    preview: Preview = "true",
+    predictor: str = DEFAULT,
+) -> LiveMachine:
     """A policy on its machine, warmed up: kernels are compiled, and the policy has acted once.
 
     Args:
         policy: A policy, or any object with ``predict``.
         platform: The machine.
         vestibular: Perception model by name.
+        preview: Where a policy with a preview has it from: "true" for cues that are sent ahead of time,
+            "held" for the present cue, "predicted" for a predictor.
+        predictor: Name or file of the predictor.
 
     Raises:
         ConfigurationError: the policy must know the drive before it begins, or was made for another machine,
             time step or perception model.
     """
     policy = as_policy(policy)
-    if policy.needs_drive:
+    seen_ahead = policy.information.kind == "preview"
+    if policy.needs_drive and not (seen_ahead and preview != "true"):
         raise ConfigurationError(
             f"{policy.name} must know the drive before it begins; live cues are not known ahead"
         )
@@ -341,7 +515,9 @@ def make_machine(policy: Any, platform: Platform, vestibular: str = "zacharias")
         raise ConfigurationError(
             f"the policy's time step is {policy.time_step} s, the machine's {TIME_STEP} s"
         )
-    machine = LiveMachine(policy.for_platform(platform), platform, get_vestibular_model(vestibular))
+    forecast = LiveForecast(preview, predictor) if seen_ahead and preview != "true" else None
+    model = get_vestibular_model(vestibular)
+    machine = LiveMachine(policy.for_platform(platform), platform, model, forecast)
     # A step of every kind, then at rest again: the first in real time takes no longer than the others.
     try:
         for _ in range(_WARMING):

@@ -3,20 +3,37 @@
 Axes: x forward, y right, z down. SI units and radians. Specific force is f = a - g: (0, 0, -9.81) in a car
 that stands. The plain format ("floats") is little-endian, and ends in the CRC-32 of zlib over all before it.
 
-Cues, 76 bytes; a sender that knows no pause writes version 1:
+Cues, 76 bytes; a sender that knows no pause writes version 1, one that knows more of the car version 3:
 
 =====  =========  ================================================================
 bytes  type       content
 =====  =========  ================================================================
 0-3    4 bytes    ``MCGC``
-4-5    uint16     version, 1 or 2
-6-7    uint16     flags: in version 2, bit 0 says that the drive is paused; else 0
+4-5    uint16     version, 1 to 3
+6-7    uint16     flags: from version 2 on, bit 0 says that the drive is paused;
+                  in version 3, bit 1 that controls follow, and bit 2 that the
+                  road does; else 0
 8-15   uint64     sequence: one more for each packet
 16-23  double     time of the sender's clock, s
 24-47  3 doubles  specific force at the cab's reference point of the car, m/s^2
 48-71  3 doubles  angular velocity of the car, rad/s
 72-75  uint32     CRC-32 of bytes 0-71
 =====  =========  ================================================================
+
+In version 3 these come before the checksum, each where its flag says so:
+
+========  ===========  =============================================================
+block     type         content
+========  ===========  =============================================================
+controls  5 doubles    angle of the steering wheel, rad, positive to the right;
+                       shares of throttle and brake; speed, m/s; side slip, rad,
+                       positive to the right
+road      49 doubles   distance to the next stop, m, 10000 for none; then, at each of
+                       :data:`~motion_cueing.envs.road.ROAD_TIMES` by the present
+                       speed (3 m/s at least): curvature, 1/m, positive to the right;
+                       slope, rad, positive uphill; cross slope, rad, right side down
+                       positive; speed limit, m/s. First all curvatures, and so on
+========  ===========  =============================================================
 
 Set-points, version 1, 364 bytes, for the end of the period that begins when they are sent:
 
@@ -41,7 +58,8 @@ bytes    type       content
 =======  =========  =================================================================================
 
 MessagePack ("msgpack") has the same content as maps. Cues: ``version``, ``sequence``, ``time``, ``force``,
-``rate``; in version 2 ``paused``, a boolean. Set-points: ``version``, ``state``, ``sequence``, ``echo``,
+``rate``; from version 2 on ``paused``, a boolean; in version 3 ``controls``, 5 numbers, and ``road``, 49, or
+neither. Set-points: ``version``, ``state``, ``sequence``, ``echo``,
 ``echo_time``, ``received``, ``sent``, ``position``, ``velocity``, ``acceleration``, ``legs``, ``leg_rates``.
 """
 
@@ -49,12 +67,14 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.errors import ConfigurationError, DataError, look_up
+from ..envs.road import NO_STOP, ROAD_TIMES
 from .watchdog import State
 
 Floats = NDArray[np.float64]
@@ -66,7 +86,11 @@ VERSION: Final = 1
 FLAGS_VERSION: Final = 2
 """Of cues with flags."""
 
-_PAUSED: Final = 1
+KNOWN_VERSION: Final = 3
+"""Of cues with the driver's controls or the road ahead."""
+
+_PAUSED, _CONTROLS, _ROAD = 1, 2, 4
+"""Bits of the flags."""
 
 LARGEST: Final = 2048
 """Longest datagram that is read, bytes."""
@@ -86,6 +110,63 @@ MOTION: Final = {
 MOTION_SIZE: Final = 39
 
 
+class Controls(NamedTuple):
+    """Controls of the driver, and state of the car, at one moment.
+
+    Args:
+        wheel: Angle of the steering wheel, rad, positive to the right.
+        throttle: Share.
+        brake: Share.
+        speed: m/s.
+        slip: Side slip, rad, positive to the right.
+    """
+
+    wheel: float
+    throttle: float
+    brake: float
+    speed: float
+    slip: float = 0.0
+
+
+Places = tuple[float, ...]
+"""A number at each of :data:`~motion_cueing.envs.road.ROAD_TIMES`."""
+
+
+class Road(NamedTuple):
+    """Road ahead at one moment.
+
+    Args:
+        curvature: 1/m, positive to the right, at each of :data:`~motion_cueing.envs.road.ROAD_TIMES`.
+        grade: rad, positive uphill, likewise.
+        bank: rad, right side down positive, likewise.
+        speed_limit: m/s, likewise.
+        stop_distance: m to the next stop; :data:`~motion_cueing.envs.road.NO_STOP` where none is known.
+    """
+
+    curvature: Places
+    grade: Places
+    bank: Places
+    speed_limit: Places
+    stop_distance: float = NO_STOP
+
+    @property
+    def numbers(self) -> Places:
+        """Everything in the order of a packet."""
+        return (self.stop_distance, *self.curvature, *self.grade, *self.bank, *self.speed_limit)
+
+    @classmethod
+    def of(cls, numbers: Sequence[float]) -> Road:
+        """From :attr:`numbers`."""
+        n = len(ROAD_TIMES)
+        curvature, grade, bank, limit = (tuple(numbers[1 + k * n : 1 + (k + 1) * n]) for k in range(4))
+        return cls(curvature, grade, bank, limit, numbers[0])
+
+
+CONTROLS_SIZE: Final = len(Controls._fields)
+ROAD_SIZE: Final = 1 + 4 * len(ROAD_TIMES)
+"""Numbers of each block of version 3."""
+
+
 class Cues(NamedTuple):
     """Cues of the car at one moment.
 
@@ -95,6 +176,8 @@ class Cues(NamedTuple):
         force: Specific force f = a - g at the cab's reference point of the car, m/s^2.
         rate: Angular velocity of the car, rad/s.
         paused: Whether the drive is paused: force and rate mean nothing, as in the menu of a game.
+        controls: Of the driver, where the sender has them.
+        road: Ahead, where the sender has a map.
     """
 
     sequence: int
@@ -102,6 +185,27 @@ class Cues(NamedTuple):
     force: Triple
     rate: Triple
     paused: bool = False
+    controls: Controls | None = None
+    road: Road | None = None
+
+    @property
+    def flags(self) -> int:
+        """Bits for a packet."""
+        return (
+            _PAUSED * self.paused + _CONTROLS * (self.controls is not None) + _ROAD * (self.road is not None)
+        )
+
+    @property
+    def version(self) -> int:
+        """The lowest that has all of it."""
+        if self.flags & (_CONTROLS | _ROAD):
+            return KNOWN_VERSION
+        return FLAGS_VERSION if self.paused else VERSION
+
+    @property
+    def known(self) -> Places:
+        """The numbers of controls and road."""
+        return (*(self.controls or ()), *(() if self.road is None else self.road.numbers))
 
 
 class SetPoint(NamedTuple):
@@ -144,9 +248,12 @@ class FloatsFormat:
     SETPOINT_SIZE: Final = _HEAD.size + 8 * MOTION_SIZE + 4
 
     def pack_cues(self, cues: Cues) -> bytes:
-        """The datagram of cues, 76 bytes."""
-        flags = (FLAGS_VERSION, _PAUSED) if cues.paused else (VERSION, 0)
-        body = self._CUES.pack(self.CUES_MAGIC, *flags, cues.sequence, cues.time, *cues.force, *cues.rate)
+        """The datagram of cues, 76 bytes, more with controls and road."""
+        head = cues.version, cues.flags, cues.sequence, cues.time
+        body = self._CUES.pack(self.CUES_MAGIC, *head, *cues.force, *cues.rate)
+        known = cues.known
+        if known:
+            body += struct.pack(f"<{len(known)}d", *known)
         return body + zlib.crc32(body).to_bytes(4, "little")
 
     def unpack_cues(self, data: bytes) -> Cues:
@@ -155,10 +262,17 @@ class FloatsFormat:
         Raises:
             DataError: size, magic, version or checksum are wrong.
         """
-        body = _checked(data, self.CUES_SIZE, self.CUES_MAGIC, FLAGS_VERSION)
-        _, version, flags, sequence, time, fx, fy, fz, wx, wy, wz = self._CUES.unpack(body)
-        paused = version == FLAGS_VERSION and bool(flags & _PAUSED)
-        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz), paused)
+        size, flags = self.CUES_SIZE, 0
+        if len(data) >= self.CUES_SIZE:
+            version, flags = struct.unpack_from("<HH", data, 4)
+            if version != KNOWN_VERSION:
+                flags &= _PAUSED if version == FLAGS_VERSION else 0
+            size += 8 * (CONTROLS_SIZE * bool(flags & _CONTROLS) + ROAD_SIZE * bool(flags & _ROAD))
+        body = _checked(data, size, self.CUES_MAGIC, KNOWN_VERSION)
+        _, _, _, sequence, time, fx, fy, fz, wx, wy, wz = self._CUES.unpack_from(body)
+        known = struct.unpack_from(f"<{(len(body) - self._CUES.size) // 8}d", body, self._CUES.size)
+        controls, road = _known(known, flags)
+        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz), bool(flags & _PAUSED), controls, road)
 
     def pack_setpoint(self, setpoint: SetPoint) -> bytes:
         """The datagram of a set-point, 364 bytes."""
@@ -176,6 +290,13 @@ class FloatsFormat:
         _, _, state, _, sequence, echo, echo_time, received, sent = self._HEAD.unpack_from(body)
         motion = np.frombuffer(body, dtype="<f8", offset=self._HEAD.size).astype(np.float64)
         return SetPoint(_state(state), sequence, echo, echo_time, received, sent, motion)
+
+
+def _known(numbers: Sequence[float], flags: int) -> tuple[Controls | None, Road | None]:
+    """Controls and road of the numbers that follow the cues."""
+    first = CONTROLS_SIZE if flags & _CONTROLS else 0
+    controls = Controls(*numbers[:first]) if first else None
+    return controls, Road.of(numbers[first:]) if flags & _ROAD else None
 
 
 def _checked(data: bytes, size: int, magic: bytes, newest: int) -> bytes:
@@ -213,19 +334,30 @@ class MessagePackFormat:
 
     def pack_cues(self, cues: Cues) -> bytes:
         """The datagram of cues."""
-        fields = {"version": FLAGS_VERSION if cues.paused else VERSION} | cues._asdict()
-        if not cues.paused:
+        fields: dict[str, Any] = {"version": cues.version} | cues._asdict()
+        if cues.version == VERSION:
             del fields["paused"]
+        for name, block in (("controls", cues.controls), ("road", cues.road and cues.road.numbers)):
+            del fields[name]
+            if block is not None:
+                fields[name] = list(block)
         return bytes(self._library.packb(fields))
 
     def unpack_cues(self, data: bytes) -> Cues:
         """The cues of a datagram; their numbers may be NaN."""
-        fields = self._fields(data, FLAGS_VERSION)
+        fields = self._fields(data, KNOWN_VERSION)
         sequence = _sequence(fields, "sequence", NO_SEQUENCE - 1)
         fx, fy, fz = _numbers(fields, "force", 3)
         wx, wy, wz = _numbers(fields, "rate", 3)
-        paused = fields["version"] == FLAGS_VERSION and fields.get("paused") is True
-        return Cues(sequence, _number("time", fields.get("time")), (fx, fy, fz), (wx, wy, wz), paused)
+        paused = fields["version"] >= FLAGS_VERSION and fields.get("paused") is True
+        knows = fields["version"] == KNOWN_VERSION
+        controls = road = None
+        if knows and "controls" in fields:
+            controls = Controls(*_numbers(fields, "controls", CONTROLS_SIZE))
+        if knows and "road" in fields:
+            road = Road.of(_numbers(fields, "road", ROAD_SIZE))
+        time = _number("time", fields.get("time"))
+        return Cues(sequence, time, (fx, fy, fz), (wx, wy, wz), paused, controls, road)
 
     def pack_setpoint(self, setpoint: SetPoint) -> bytes:
         """The datagram of a set-point."""

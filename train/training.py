@@ -15,12 +15,15 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from ..baselines import ClassicalWashout, NoMotion
 from ..envs.errors import ConfigurationError, DataError
 from ..envs.progress import Interrupt
 from ..envs.settings import from_dict, to_dict
 from ..envs.task.batch import Batch
 from ..envs.task.episode import platform_of
+from ..envs.task.kernels.observation import layout_of
 from .agents import Agent, PolicyNetwork, Record
 from .agents.agent import DEFAULT, base_of, find_agent
 from .config import Measure, TrainingConfig
@@ -38,7 +41,7 @@ def initial_agent(config: TrainingConfig) -> Agent | None:
 
 
 def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
-    """Its network.
+    """Its network; rows of controls and road that it does not see begin without an effect.
 
     Raises:
         DataError: the file cannot be read.
@@ -47,15 +50,32 @@ def initial_network(config: TrainingConfig) -> PolicyNetwork | None:
     agent = initial_agent(config)
     if agent is None:
         return None
+    ours, own = config.task.observation, agent.task.observation
+    added = replace(own, controls=ours.controls, road=ours.road, allow_missing=ours.allow_missing)
+    widens = added == ours and own.stack == 1 and not agent.network.lstm
     # An agent that observes its machine begins on any.
-    same = (
-        ("observation", "action") if agent.task.observation.machine else ("platform", "observation", "action")
-    )
+    same = ["action", *([] if own.machine else ["platform"]), *([] if widens else ["observation"])]
     for name in same:
-        theirs, ours = getattr(agent.task, name), getattr(config.task, name)
-        if theirs != ours:
-            raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {ours}")
-    return agent.network
+        theirs, asked = getattr(agent.task, name), getattr(config.task, name)
+        if theirs != asked:
+            raise ConfigurationError(f"initial {config.initial}: its task.{name} is {theirs}, not {asked}")
+    return _widened(agent, config) if own != ours else agent.network
+
+
+def _widened(agent: Agent, config: TrainingConfig) -> PolicyNetwork:
+    """The network of an agent for more rows, which have no effect yet."""
+    action = config.task.action
+    # Every entry of an action has a place, whatever its number.
+    before, after = (
+        layout_of(seen, action.mode, action.size)
+        for seen in (agent.task.observation, config.task.observation)
+    )
+    sizes = {row.name: row.size for row in after.rows}
+    lost = [row.name for row in before.rows if sizes.get(row.name) != row.size]
+    if lost:
+        raise ConfigurationError(f"initial {config.initial}: it sees {', '.join(lost)}, which the task lacks")
+    places = np.concatenate([np.arange(after.size)[after.slices[row.name]] for row in before.rows])
+    return agent.network.head.widened(places, after.size)
 
 
 def start_actor(actor: Actor, batch: Batch, config: TrainingConfig) -> None:

@@ -227,6 +227,8 @@ class Forecaster:
         if cues is not None:
             # After its end a drive holds its last cue.
             drive = np.hstack([cues.specific_force, cues.angular_velocity])
+            self._expected = cues.expected
+            self._ahead = TIME_STEP * np.arange(1, known + 1)
             self._drive = np.concatenate([drive, np.repeat(drive[-1:], known, axis=0)])
             self._drive_sustained = lfilter(
                 [self._gain],
@@ -251,6 +253,12 @@ class Forecaster:
         count = self._known.shape[1]
         if count == 0:
             return self._extrapolated(now, sustained)
+        if self._expected is not None:
+            here = slice(min(sample, len(self._expected) - 1), min(sample, len(self._expected) - 1) + 1)
+            preview = self._expected.at(now[None, :], self._ahead, here)[0]
+            for cue in preview:
+                sustained = self.update(sustained, cue)
+            return np.asarray(self._known @ preview + self._extrapolated(preview[-1], sustained))
         last = min(sample, len(self._drive) - count - 1) + count
         preview = self._drive[last + 1 - count : last + 1]
         return np.asarray(

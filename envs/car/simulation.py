@@ -20,6 +20,7 @@ from scipy.signal import butter, cont2discrete, lfilter, sosfilt, ss2tf
 from ..arrays import FLOAT, real
 from ..cues import GRAVITY, CueTrace
 from ..errors import DataError
+from ..road import RoadMap, Route
 from .kernels.driver import (
     COLUMNS,
     MEMORY,
@@ -192,6 +193,7 @@ class Plan:
         driver: Who drives; the default driver, or a :data:`ROBOT` where ``steering`` is given.
         roughness: Of the road; None for a smooth one.
         source: For reports.
+        route: What is known of the road; the whole path, and its stops, if None.
         seed: Of the driver's errors by chance.
     """
 
@@ -203,6 +205,7 @@ class Plan:
     driver: Driver | None = None
     roughness: RoadRoughness | None = None
     source: str = field(default="")
+    route: Route | None = None
     seed: tuple[int, ...] = (0,)
 
     def __post_init__(self) -> None:
@@ -210,6 +213,13 @@ class Plan:
             return
         if self.steering.shape != self.schedule.speed.shape or not np.isfinite(self.steering).any():
             raise DataError(f"{self.name}: steering must be {len(self.schedule)} finite angles, one a sample")
+
+    @property
+    def known_route(self) -> Route:
+        """What is known of the road: what was given, or the path and the largest planned speed."""
+        if self.route is not None:
+            return self.route
+        return Route.of_road(self.path.curvature, float(self.schedule.speed.max()))
 
     @property
     def follows(self) -> NDArray[np.bool_]:
@@ -238,8 +248,9 @@ def simulate(plans: Sequence[Plan], device: str = "cpu") -> list[CueTrace]:
         One trace a plan, sampled at 100 Hz, at the origin of F_A, with the channels
         :data:`~.drive_kernel.COLUMNS`: accelerations are those of the point of the roll axis under the c.g.,
         in the road's frame; ``path_offset_m`` is the distance to the right of the path; throttle and brake
-        are shares; ``gear`` is there for cars that have a gearbox. On a rough road its shaking is added to
-        all three cues.
+        are shares; ``gear`` is there for cars that have a gearbox, ``station_m`` is the way along the path.
+        On a rough road its shaking is added to all three cues. What is known of the road is the trace's
+        ``road``.
 
     Raises:
         DataError: the car left the range of the model (a plan no car can follow).
@@ -366,4 +377,11 @@ def _trace(plan: Plan, rows: Floats) -> CueTrace:
         angular_acceleration=rate_derivative,
         channels=channels,
         source=plan.source or f"{plan.car.name}, vehicle model",
+        road=RoadMap.of_route(
+            plan.known_route,
+            plan.path.grade,
+            plan.path.bank,
+            channels["station_m"],
+            channels["speed_m_s"],
+        ),
     )

@@ -25,6 +25,7 @@ from ..car.simulation import Plan, simulate
 from ..car.vehicles import Car
 from ..cues import CueTrace
 from ..errors import ConfigurationError
+from ..road import Route
 from ..settings import Positive, configuration
 from .roads import KMH, Floats
 from .standard import Maneuver
@@ -216,7 +217,8 @@ class ConeManeuver(Maneuver):
         near = tuple(Gate(g.start - start, g.end - start, g.left, g.right) for g in gates)
         path = practised_path(near, car, self.speed, length - start, self.margin).delayed(start)
         schedule = Schedule.of(self.speed, [Hold(length / self.speed + self.calm)])
-        return Plan(self.name, car, path, schedule, driver=TEST_DRIVER)
+        route = Route.of_cones(path.curvature, self.speed)
+        return Plan(self.name, car, path, schedule, driver=TEST_DRIVER, route=route)
 
 
 @configuration

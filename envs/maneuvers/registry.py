@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ..cues import CueTrace
 from ..errors import ConfigurationError, look_up
 from ..registry import Registry
+from ..road import RoadMap
 
 if TYPE_CHECKING:
     from .standard import Maneuver
@@ -93,6 +94,10 @@ _SOURCES: Final[Mapping[str, str]] = {
 }
 
 
+_LIMITS: Final[Mapping[str, float]] = {"city-drive": 50.0 / 3.6, "commute": 65.0 * 0.44704}
+"""Legal speed limits of the recorded roads, m/s: of German towns, and of Californian highways."""
+
+
 def recording_names() -> list[str]:
     """Names of the recorded drives."""
     return sorted(_SOURCES)
@@ -104,10 +109,15 @@ def describe_recording(name: str) -> str:
 
 
 def get_recording(name: str) -> CueTrace:
-    """A recorded drive: 100 Hz, F_A axes, with the channel ``speed_m_s``.
+    """A recorded drive: 100 Hz, F_A axes, with the channel ``speed_m_s``, and its road.
+
+    The road has the curvature of the driven path, smoothed as a map is, and the legal speed limit.
 
     Raises:
         UnknownNameError: no recording has this name.
     """
     source = describe_recording(name)
-    return replace(CueTrace.from_csv(_FOLDER / name / _FILE, name=name), source=source)
+    trace = CueTrace.from_csv(_FOLDER / name / _FILE, name=name)
+    speed, yaw_rate = trace.channels["speed_m_s"], trace.angular_velocity[:, 2]
+    road = RoadMap.of_recording(speed, yaw_rate, trace.dt, _LIMITS[name])
+    return replace(trace, source=source, road=road)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -467,6 +467,10 @@ def sine_with_dwell(time: Floats, frequency: float, dwell: float) -> Floats:
     return np.where(inside, np.sin(2.0 * math.pi * frequency * phase), 0.0)
 
 
+Known = Literal["map", "cones", "nobody"]
+"""Who knows a stretch before it is driven: a map, a scenario that has put up cones, or the driver alone."""
+
+
 @dataclass
 class Road:
     """A road under construction: what to drive, how fast, and where to stop.
@@ -483,6 +487,9 @@ class Road:
         circuit: That is driven round.
         lateral: Centripetal acceleration of its drivers, m/s^2.
         laps: Point where each lap of the circuit begins.
+        mapped: Curvature of its stretches as a map has them.
+        cones: What cones add to it.
+        posted: Legal limits of its stretches, m/s.
     """
 
     kind: RoadKind
@@ -496,6 +503,9 @@ class Road:
     circuit: Circuit | None = None
     lateral: float = math.inf
     laps: list[int] = field(default_factory=list)
+    mapped: list[Floats] = field(default_factory=list)
+    cones: list[Floats] = field(default_factory=list)
+    posted: list[Floats] = field(default_factory=list)
 
     def draw(self, bounds: Range) -> float:
         """Uniform within the bounds."""
@@ -505,9 +515,13 @@ class Road:
         """Left (-1) or right (1)."""
         return float(self.rng.choice((-1.0, 1.0)))
 
-    def add(self, curvature: Floats, limit: float | None = None) -> None:
-        """Append a stretch, with a limit of its own or the road's."""
+    def add(self, curvature: Floats, limit: float | None = None, known: Known = "map") -> None:
+        """Append a stretch, with a limit of its own or the road's, and whoever knows it ahead."""
         self.curvature.append(curvature)
+        zero = np.zeros(len(curvature))
+        self.mapped.append(curvature if known == "map" else zero)
+        self.cones.append(curvature if known == "cones" else zero)
+        self.posted.append(np.full(len(curvature), self.limit))
         self.limits.append(np.full(len(curvature), self.limit if limit is None else limit))
         self.points += len(curvature)
 
@@ -556,7 +570,7 @@ def add_lane_change(road: Road) -> None:
     length = road.draw(road.kind.lane_change) * road.limit
     stations = np.arange(0.0, length, STEP)
     peak = 2.0 * np.pi * road.draw(LANE_WIDTH) / length**2
-    road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length))
+    road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length), known="nobody")
 
 
 def add_weave(road: Road) -> None:
@@ -565,7 +579,7 @@ def add_weave(road: Road) -> None:
     stations = np.arange(0.0, length * round(road.draw(WEAVE_PERIODS)), STEP)
     # The car sways by peak (length / 2 pi)^2 to either side.
     peak = road.draw(road.kind.weave_width) * (2.0 * np.pi / length) ** 2
-    road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length))
+    road.add(road.sign() * peak * np.sin(2.0 * np.pi * stations / length), known="cones")
 
 
 def add_roundabout(road: Road) -> None:

@@ -15,6 +15,7 @@ from ..car.simulation import Plan, RoadRoughness, simulate
 from ..car.vehicles import Car, Stability, car_names, get_car
 from ..cues import GRAVITY, CueTrace
 from ..errors import ConfigurationError, UnknownNameError, suggest
+from ..road import Route
 from ..settings import (
     NonNegative,
     check_names,
@@ -267,7 +268,17 @@ def _plan(
     if within_car and kind_name in STABILIZED:
         car = stabilized(car)
     steering = _steering(road.steers, car, schedule) if road.steers else None
-    return Plan(name, car, path, schedule, steering=steering, source=source), road
+    route = Route(
+        np.concatenate(road.mapped),
+        np.concatenate(road.cones),
+        np.concatenate(road.posted),
+        stops=kind_name not in EMERGENCIES,
+    )
+    return Plan(name, car, path, schedule, steering=steering, source=source, route=route), road
+
+
+EMERGENCIES: Final = ("limit",)
+"""Kinds whose stops are emergencies, which nobody knows ahead; those of others are lines, lights, queues."""
 
 
 STABILIZED: Final = ("track", "strip", "cones", "circuit", "limit")

@@ -14,6 +14,7 @@ from ..car.plans import DT, STEP, Change, Hold, Path, Schedule, bend
 from ..car.simulation import Plan, straight
 from ..car.vehicles import Car, Gearbox
 from ..cues import GRAVITY
+from ..road import Route
 from ..settings import Positive, configuration
 from .roads import KMH, Ability, Floats, Style, along_path, sine_with_dwell, speed_limit
 from .sampling import stabilized
@@ -131,7 +132,8 @@ class CircuitLap(Maneuver):
         top[: len(before)] = top[-round(self.speed * (self.calm + 1.0) / STEP) :] = self.speed
         limit = speed_limit(path.curvature, top, style)
         ability = Ability(car, path.curvature, path.grade)
-        return Plan(self.name, car, path, along_path(limit, style, [], None, self.smoothing, ability))
+        schedule = along_path(limit, style, [], None, self.smoothing, ability)
+        return Plan(self.name, car, path, schedule, route=Route.of_road(path.curvature, self.top_speed))
 
 
 @configuration
@@ -210,4 +212,7 @@ class SurgeAndBrake(Maneuver):
             Change(0.0, self.deceleration, self.jerk, math.inf),
             Hold(self.calm, brake=self.deceleration),
         ]
-        return Plan(self.name, car, straight(), Schedule.of(0.0, phases))
+        path = straight()
+        # The stop is an emergency, which nobody knows ahead.
+        route = Route.unknown(path.curvature, self.acceleration * self.duration)
+        return Plan(self.name, car, path, Schedule.of(0.0, phases), route=route)

@@ -16,6 +16,7 @@ from ..car.simulation import Plan, simulate, straight
 from ..car.vehicles import SEDAN, Car
 from ..cues import GRAVITY, CueTrace
 from ..errors import ConfigurationError
+from ..road import Route
 from ..settings import Positive, configuration
 from .roads import KMH, Floats, Style, along_path, sine_with_dwell, speed_limit
 
@@ -168,7 +169,9 @@ class LaneChange(Maneuver):
         wave = np.where(
             (time > 0.0) & (time < self.duration), np.sin(2.0 * np.pi * time / self.duration), 0.0
         )
-        return Plan(self.name, car, Path.of_curvature(-self.peak / self.speed**2 * wave), schedule)
+        path = Path.of_curvature(-self.peak / self.speed**2 * wave)
+        # Nobody knows it ahead but the driver.
+        return Plan(self.name, car, path, schedule, route=Route.unknown(path.curvature, self.speed))
 
 
 # Open-loop steering tests: a robot turns the wheel, the driver only keeps the speed.

@@ -29,7 +29,13 @@ class BatchArrays:
     """The arrays of a batch, as attributes named like the fields of :class:`~.kernels.episode.Arrays`."""
 
     def __init__(
-        self, n: int, action_size: int, layout: Layout, memory: NDArray[np.float32], device: Any
+        self,
+        n: int,
+        action_size: int,
+        layout: Layout,
+        memory: NDArray[np.float32],
+        known: NDArray[np.float32],
+        device: Any,
     ) -> None:
         self.episode = Mirror(n, Episode, device)
         self.begins = Mirror(n, wp.bool, device)
@@ -50,6 +56,9 @@ class BatchArrays:
         self.memory = Mirror(memory.shape, wp.float32, device)
         self.memory.view[...] = memory
         self.memory.push()
+        self.known = Mirror(known.shape, wp.float32, device)
+        self.known.view[...] = known
+        self.known.push()
 
     def for_kernels(self) -> Any:
         """The kernels' form."""
@@ -63,7 +72,7 @@ class BatchArrays:
         return [(name, mirror) for name, mirror in vars(self).items() if name not in _CONSTANT]
 
 
-_CONSTANT: Final = ("bounds", "memory")
+_CONSTANT: Final = ("bounds", "memory", "known")
 """Arrays that are what they were when the batch was made."""
 
 

@@ -27,7 +27,8 @@ from ..errors import ConfigurationError
 from ..platform.machines import Platform
 from ..simulator.simulator import TIME_STEP, Simulator, Snapshot, bytes_of, put_bytes
 from .arrays import FRAME, BatchArrays, Launches, rules_of
-from .kernels.observation import layout_of, low_passed
+from .kernels.observation import ObservationOptions, layout_of, low_passed
+from .knowledge import expected_of, known_of
 from .options import TaskOptions
 from .sensors import sensed_drives
 
@@ -90,12 +91,14 @@ class Base:
         every: Time steps from one action of the policy to the next; 0 for never.
         before: Whether it acts before each time step, with the agent's action, instead of after it.
         memories: Low-passed cues that its own observation holds, and their time constants, s.
+        known: Controls and road that its own observation holds, and what is seen of them.
     """
 
     policy: Any = None
     every: int = 0
     before: bool = False
     memories: tuple[tuple[Mirror, tuple[float, ...]], ...] = ()
+    known: tuple[tuple[Mirror, ObservationOptions], ...] = ()
 
     def begin(self, mask: Mask) -> None:
         """Episodes begin in the masked environments."""
@@ -225,12 +228,18 @@ class TaskBase(_Remembering):
         sensors = options.randomization.car_sensors
         sensed = sensed_drives(drives, sensors, options.episode.library_seed)
         memory = low_passed(sensed, task.observation.memory, TIME_STEP)
-        self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, simulator.device)
+        errors, seed = options.randomization.road, options.episode.library_seed
+        known = known_of(drives, task.observation, errors, seed)
+        expected = expected_of(drives, task.observation)
+        known = np.hstack((known, expected)) if expected.size else known
+        self.arrays = BatchArrays(simulator.n, task.action.size, layout, memory, known, simulator.device)
+        self.known = ((self.arrays.known, task.observation),)
         self.memories = ((self.arrays.memory, task.observation.memory),)
         self.arrays.episode, self.arrays.begins = shared.episode, shared.begins
         rules = rules_of(
             task, layout, simulator.platforms, TIME_STEP, simulator.device, () if sensors.perfect else sensed
         )
+        rules.view.expected = expected.shape[1]
         self._launches = Launches(simulator, self.arrays, rules)
         self._commanded = self.arrays.command.view["commanded"]
 

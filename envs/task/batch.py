@@ -35,7 +35,8 @@ from .episode import (
     uniform,
 )
 from .kernels.action import action_scale
-from .kernels.observation import COMPARED, layout_of, low_passed
+from .kernels.observation import COMPARED, ObservationOptions, layout_of, low_passed
+from .knowledge import expected_of, known_of
 from .options import TaskOptions
 from .sensors import sensed_drives
 
@@ -93,7 +94,11 @@ class Batch:
         sensors = options.randomization.car_sensors
         seen = sensed_drives(self.drives, sensors, options.episode.library_seed)
         memory = low_passed(seen, options.observation.memory, TIME_STEP)
-        self.arrays = BatchArrays(n, self.action_size, self.layout, memory, self.simulator.device)
+        errors = options.randomization.road
+        known = known_of(self.drives, options.observation, errors, options.episode.library_seed)
+        expected = expected_of(self.drives, options.observation)
+        known = np.hstack((known, expected)) if expected.size else known
+        self.arrays = BatchArrays(n, self.action_size, self.layout, memory, known, self.simulator.device)
         self._clipped: NDArray[np.int32] = self.arrays.command.view["clipped"]
         self.base = self._base(policy)
         platforms = self.simulator.platforms
@@ -106,8 +111,14 @@ class Batch:
         self.rules = rules_of(
             options, self.layout, platforms, TIME_STEP, self.simulator.device, () if sensors.perfect else seen
         )
+        self.rules.view.expected = expected.shape[1]
         self._launches = Launches(self.simulator, self.arrays, self.rules)
         self.beside = self._base_alone(policy)
+
+    @property
+    def known(self) -> tuple[tuple[Mirror, ObservationOptions], ...]:
+        """Controls and road that observations hold, the base policy's included, and what is seen of them."""
+        return ((self.arrays.known, self.options.observation), *self.base.known)
 
     @property
     def memories(self) -> tuple[tuple[Mirror, tuple[float, ...]], ...]:

@@ -33,6 +33,7 @@ from ..settings import (
 from .kernels.action import ActionOptions
 from .kernels.observation import ObservationOptions
 from .kernels.reward import RewardOptions
+from .knowledge import MapErrors
 from .sensors import CarSensors
 
 Count = Annotated[int, Field(ge=0)]
@@ -95,6 +96,7 @@ class RandomizationOptions:
         force_noise: Standard deviation of the noise of the cab's accelerometers, m/s^2.
         rate_noise: Standard deviation of the noise of its gyroscopes, rad/s.
         car_sensors: Errors of the car's cues as they are seen; the reward knows the true ones.
+        road: Errors of what is known of the road ahead.
     """
 
     friction: tuple[Positive, Positive] = (1.0, 1.0)
@@ -107,6 +109,7 @@ class RandomizationOptions:
     force_noise: NonNegative = 0.0
     rate_noise: NonNegative = 0.0
     car_sensors: CarSensors = CarSensors()
+    road: MapErrors = MapErrors()
 
     def __post_init__(self) -> None:
         for name in ("friction", "natural_frequency", "dead_time"):

@@ -108,7 +108,7 @@ class TaskUnroll:
         arrays, step = batch.arrays, k * self.repeat
         return [
             batch.rules, arrays.episode.array, machines, drives, machine_of, drive_of, arrays.memory.array,
-            arrays.bounds.array, self._taken[k], self._own[step], self._states[step],
+            arrays.known.array, arrays.bounds.array, self._taken[k], self._own[step], self._states[step],
             self._fixed[k], self._seen[k],
         ]  # fmt: skip
 

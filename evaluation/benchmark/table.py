@@ -30,6 +30,8 @@ BENCHMARK_POLICIES: Final = (
     "learned-any-now",
     "learned-perceived",
     "learned",
+    "learned-controls",
+    "learned-road",
     "mpc-preview",
     "nmpc-preview",
     "mpc-full",

@@ -167,6 +167,10 @@ def time_scaled(cues: CueTrace, factor: float) -> CueTrace:
         specific_force=rest + factor * (cues.specific_force - rest),
         angular_velocity=turning * cues.angular_velocity,
         angular_acceleration=speed * turning * cues.angular_acceleration,
+        channels={
+            name: speed * values if name.endswith("speed_m_s") else values
+            for name, values in cues.channels.items()
+        },
     )
     return faster.resampled(cues.dt)
 

@@ -422,7 +422,7 @@ def _check_task(policy: Agent, machine: Platform) -> None:
         raise _refusal(policy, why)
     if policy.task.action.mode == "gains":
         raise _refusal(policy, "its actions are a washout's gains; export it by itself")
-    for option in ("perceived", "true_motion", "against_base"):
+    for option in ("perceived", "true_motion", "against_base", "controls", "road"):
         if getattr(seen, option):
             raise _refusal(policy, f"its observation.{option} is not made in C; export it by itself")
 
@@ -595,10 +595,12 @@ class _Environment:
         drives = Code("drives", type_of(simulator.Drives), variable=True)
         view = Code(self._view, type_of(task_observation.View), path=self._view)
         scale = Code(self._action, type_of(task_action.ActionScale), path=self._action)
+        # Controls and road are refused, so that the array after the memory is never read.
         written = to.call(
             task_observation.write_frame, view, drives, zero,
             Code("EPISODE", type_of(task_observation.Episode), path="EPISODE"), zero, _MACHINE_CODE, state,
             rows["fixed"], rows["now"], Code(f"state->{p}own", type_of(vec9)), base, rows["memory"],
+            rows["memory"],
             Code(self._bounds, type_of(pair_array)), rows["seen"], zero,
         )  # fmt: skip
         to.use(State, "setpoint_acceleration")

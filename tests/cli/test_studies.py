@@ -91,6 +91,20 @@ def test_robustness_writes_everything(cue_file, tmp_path, capsys):
             assert ratio[who][name] != 1.0
 
 
+def test_map_faults_change_nothing_for_a_policy_that_sees_no_road(tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["map-faults", "--policies", "no-motion", "classical", "--maneuvers", "braking", "--out", str(out)]
+    assert main(argv) == 0
+    assert "16 of 16 drives driven now" in capsys.readouterr().out
+    values = json.loads((out / "study.json").read_text())
+    assert len(values["conditions"]) == 8
+    for found in values["summaries"].values():
+        assert found["classical"]["ratio"] == found["no-motion"]["ratio"] == 1.0
+    assert "Worst second of J over the drives" in (out / "study.md").read_text()
+    assert main(argv) == 0
+    assert "0 of 16 drives driven now" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -99,6 +113,7 @@ def test_robustness_writes_everything(cue_file, tmp_path, capsys):
         (["compare", "--maneuvers", "none.csv"], "no such file"),
         (["robustness", "--time-scaling", "9"], "time_scaling"),
         (["robustness", "--lag", "0"], "lag"),
+        (["map-faults", "--low", "0"], "low"),
         (["robustness", "--other-car", "tank"], "unknown car"),
     ],
 )

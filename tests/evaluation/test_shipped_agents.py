@@ -30,6 +30,11 @@ TILTS_MORE = {
         },
         {"steady-turn", "braking", "acceleration", "step-steer", "stop-and-go"},
     ),
+    "learned-controls": (
+        {"acceleration", "hill", "step-steer"},
+        {"steady-turn", "braking", "step-steer"},
+    ),
+    "learned-road": ({"step-steer"}, {"step-steer"}),
     "learned-ppo-now": (
         {"braking", "acceleration", "obstacle-avoidance", "roundabout", "stop-and-go"},
         {"steady-turn", "step-steer"},

@@ -19,6 +19,7 @@ from motion_cueing.realtime import (
     WatchdogOptions,
     make_machine,
 )
+from motion_cueing.realtime.client import controls_sent, roads_sent
 from motion_cueing.realtime.inbox import Inbox
 
 AT_ONCE = WatchdogOptions(steady=0.0, fade=0.0)
@@ -50,9 +51,9 @@ class Clock:
 class Bench:
     """A controller, its clock, and a sender of cues."""
 
-    def __init__(self, policy=None, watchdog=AT_ONCE, rate=100, platform=PAPER) -> None:
+    def __init__(self, policy=None, watchdog=AT_ONCE, rate=100, platform=PAPER, **preview) -> None:
         self.policy = policy or ClassicalWashout()
-        self.machine = make_machine(self.policy, platform)
+        self.machine = make_machine(self.policy, platform, **preview)
         inbox = Inbox(FLOATS, watchdog.stale, watchdog.overdue)
         options = ControllerOptions(rate=rate, watchdog=watchdog)
         self.controller = Controller(self.machine, platform, inbox, options)
@@ -63,9 +64,11 @@ class Bench:
         """Seconds."""
         return self.controller.periods / self.rate
 
-    def send(self, force=REST, rate=(0.0, 0.0, 0.0), paused=False) -> str:
+    def send(self, force=REST, rate=(0.0, 0.0, 0.0), paused=False, controls=None, road=None) -> str:
         """The next packet of cues."""
-        cues = Cues(self.sequence, self.now, tuple(map(float, force)), tuple(map(float, rate)), paused)
+        cues = Cues(
+            self.sequence, self.now, tuple(map(float, force)), tuple(map(float, rate)), paused, controls, road
+        )
         self.sequence += 1
         return self.controller.inbox.take(FLOATS.pack_cues(cues), SENDER, self.now)
 
@@ -77,8 +80,10 @@ class Bench:
     def drive(self, trace: CueTrace) -> np.ndarray:
         """A packet and a step of 10 ms for each sample; (n, 39) motion at the end of each step."""
         rows = []
-        for force, rate in zip(trace.specific_force, trace.angular_velocity, strict=True):
-            assert self.send(force, rate) == "used"
+        controls, roads = controls_sent(trace), roads_sent(trace)
+        for k, (force, rate) in enumerate(zip(trace.specific_force, trace.angular_velocity, strict=True)):
+            known = {"controls": controls[k] if controls else None, "road": roads[k] if roads else None}
+            assert self.send(force, rate, **known) == "used"
             for _ in range(self.rate // 100):
                 setpoint = self.step()
             rows.append(setpoint.motion)

@@ -14,8 +14,11 @@ from motion_cueing.baselines.compensation import Compensated
 from motion_cueing.baselines.washout import ScheduledWashout
 from motion_cueing.envs.cues import CueTrace
 from motion_cueing.envs.errors import ConfigurationError
+from motion_cueing.envs.maneuvers import random_drives
 from motion_cueing.envs.platform import legs_of_pose
 from motion_cueing.envs.platform.machines import ActuatorDynamics
+from motion_cueing.envs.predictor import Predictor, PredictorOptions, inputs_of, with_preview
+from motion_cueing.envs.road import ROAD_TIMES
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.envs.task.options import load_task
@@ -94,6 +97,54 @@ def test_a_policy_of_an_environment(options):
     policy = Feedback(TaskOptions(**options))
     bench = Bench(policy)
     assert_same_motion(bench, bench.drive(TRACE), rollout(policy, TRACE))
+
+
+def known_drive():
+    """Two seconds of a random drive in a bend, with its controls and its road."""
+    return random_drives(1, 12.0, 5, "urban")[0]
+
+
+def test_a_policy_that_sees_controls_and_road():
+    seen = ObservationOptions(controls=True, road=ROAD_TIMES[2:6])
+    policy, drive = Feedback(TaskOptions(observation=seen)), known_drive()
+    bench = Bench(policy)
+    sent, expected = bench.drive(drive), rollout(policy, drive)
+    assert not bench.controller.faults
+    # Rows sample by sample differ from those of the whole drive by rounding.
+    np.testing.assert_allclose(sent[:-1, :9], axes_of(expected)[1:], atol=1e-4)
+
+
+def untrained(path):
+    """A predictor with weights by chance, in a file."""
+    rng, options = np.random.default_rng(1), PredictorOptions()
+    size, outputs = inputs_of(known_drive(), options).shape[1], 12 * len(options.leads)
+    arrays = [rng.normal(size=shape).astype(np.float32) for shape in ((16, size), (outputs, 16))]
+    weights = tuple(a / a.shape[1] ** 0.5 for a in arrays)
+    biases = np.zeros(16, np.float32), np.zeros(outputs, np.float32)
+    ones = np.zeros(size, np.float32), np.ones(size, np.float32)
+    Predictor(options, *ones, weights, biases, {}).save(path)
+    return str(path)
+
+
+@pytest.mark.parametrize("preview", ["held", "predicted"])
+def test_expected_cues_in_place_of_a_preview(preview, tmp_path):
+    predictor = untrained(tmp_path / "any.safetensors")
+    seen = ObservationOptions(preview=3, preview_spacing=0.2, controls=True)
+    policy, drive = Feedback(TaskOptions(observation=seen)), known_drive()
+    bench = Bench(policy, preview=preview, predictor=predictor)
+    assert bench.machine.ahead_steps == 0
+    sent, expected = bench.drive(drive), rollout(policy, with_preview(drive, preview, predictor))
+    assert not bench.controller.faults
+    np.testing.assert_allclose(sent[:-1, :9], axes_of(expected)[1:], atol=1e-3)
+    true = axes_of(rollout(policy, drive))
+    assert np.abs(true - axes_of(expected)).max() > 0.01
+
+
+def test_packets_without_what_the_policy_sees_brake_the_machine():
+    bench = Bench(Feedback(TaskOptions(observation=ObservationOptions(controls=True))))
+    bench.drive(TRACE)
+    assert bench.controller.faults == ["the policy sees the car's speed, which the packets do not have"]
+    assert bench.controller.state is State.BRAKING or bench.controller.state is State.NEUTRAL
 
 
 @pytest.mark.parametrize("repeat", [1, 3])

@@ -14,14 +14,29 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from motion_cueing.envs.errors import ConfigurationError, DataError, UnknownNameError
-from motion_cueing.realtime.packets import MOTION, MOTION_SIZE, Cues, FloatsFormat, SetPoint, make_format
+from motion_cueing.envs.road import ROAD_TIMES
+from motion_cueing.realtime.packets import (
+    MOTION,
+    MOTION_SIZE,
+    Controls,
+    Cues,
+    FloatsFormat,
+    Road,
+    SetPoint,
+    make_format,
+)
 from motion_cueing.realtime.watchdog import State
 
 FORMATS = [make_format(name) for name in ("floats", "msgpack")]
 EVERY_FORMAT = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 NUMBER = st.floats(allow_nan=False)
 TRIPLE = st.tuples(NUMBER, NUMBER, NUMBER)
-CUES = st.builds(Cues, st.integers(0, 2**64 - 2), NUMBER, TRIPLE, TRIPLE, st.booleans())
+PLACES = st.tuples(*[NUMBER] * len(ROAD_TIMES))
+CONTROLS = st.none() | st.builds(Controls, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER)
+ROADS = st.none() | st.builds(Road, PLACES, PLACES, PLACES, PLACES, NUMBER)
+CUES = st.builds(
+    Cues, st.integers(0, 2**64 - 2), NUMBER, TRIPLE, TRIPLE, st.booleans(), controls=CONTROLS, road=ROADS
+)
 MOTIONS = st.lists(NUMBER, min_size=MOTION_SIZE, max_size=MOTION_SIZE).map(np.array)
 COUNT = st.integers(0, 2**64 - 1)
 SETPOINTS = st.builds(SetPoint, st.sampled_from(State), COUNT, COUNT, NUMBER, NUMBER, NUMBER, MOTIONS)
@@ -74,6 +89,12 @@ def test_the_bytes_are_those_of_the_documentation():
     body = b"MCGC" + struct.pack("<HHQ", 1, 0, 7) + struct.pack("<7d", 1.5, 1.0, 2.0, -9.81, 0.1, 0.2, 0.3)
     assert data == body + struct.pack("<I", zlib.crc32(body))
     assert len(data) == FloatsFormat.CUES_SIZE == 76
+    wheel = Controls(0.1, 0.2, 0.3, 4.0, 0.05)
+    places = [tuple(100.0 * part + k for k in range(12)) for part in range(4)]
+    data = FORMATS[0].pack_cues(SOME._replace(controls=wheel, road=Road(*places, stop_distance=50.0)))
+    body = b"MCGC" + struct.pack("<HHQ", 3, 6, 7) + struct.pack("<7d", 1.5, 1.0, 2.0, -9.81, 0.1, 0.2, 0.3)
+    body += struct.pack("<5d", *wheel) + struct.pack("<49d", 50.0, *sum(places, ()))
+    assert data == body + struct.pack("<I", zlib.crc32(body))
     motion = np.arange(39.0)
     data = FORMATS[0].pack_setpoint(SetPoint(State.HOLDING, 5, 7, 1.5, 2.0, 2.5, motion))
     body = b"MCGS" + struct.pack("<HBBQQ3d", 1, 2, 0, 5, 7, 1.5, 2.0, 2.5) + struct.pack("<39d", *motion)
@@ -89,12 +110,12 @@ def test_cues_of_a_paused_drive_are_of_version_2():
     fields = msgpack.unpackb(FORMATS[1].pack_cues(SOME._replace(paused=True)))
     assert (fields["version"], fields["paused"]) == (2, True)
     assert "paused" not in msgpack.unpackb(FORMATS[1].pack_cues(SOME))
-    # In version 1 the field of flags had no meaning; version 3 is not known.
-    for version, paused in ((1, False), (2, True), (3, None)):
+    # In version 1 the field of flags had no meaning; version 4 is not known.
+    for version, paused in ((1, False), (2, True), (3, True), (4, None)):
         changed = data[:4] + struct.pack("<H", version) + data[6:-4]
         changed += struct.pack("<I", zlib.crc32(changed))
         if paused is None:
-            with pytest.raises(DataError, match="version 3"):
+            with pytest.raises(DataError, match="version 4"):
                 FORMATS[0].unpack_cues(changed)
         else:
             assert FORMATS[0].unpack_cues(changed) == SOME._replace(paused=paused)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, Literal, NamedTuple, get_args
 
@@ -275,6 +275,28 @@ class Network(PolicyNetwork):
     def step(self, observation: ArrayLike, state: Any = None, begins: Any = None) -> tuple[Array, Any]:
         """The same actions, and the state as it came: there is no memory."""
         return self(observation), state
+
+    def widened(self, places: NDArray[np.intp], size: int) -> Network:
+        """The same policy of observations with more entries, which have no effect.
+
+        Args:
+            places: (self.size,) where its own entries are in the larger observation.
+            size: Entries of that.
+        """
+
+        def wide(values: NDArray[Any], fill: float = 0.0) -> NDArray[Any]:
+            out = np.full((*values.shape[:-1], size), fill, dtype=values.dtype)
+            out[..., places] = values
+            return out
+
+        weights = list(self.weights)
+        if len(weights) > 1 and self.skip:
+            own = weights[-1].shape[1] - self.size
+            weights[-1] = np.concatenate((weights[-1][:, :own], wide(weights[-1][:, own:])), axis=1)
+        weights[0] = wide(weights[0])
+        mean = None if self.mean is None else wide(self.mean)
+        variance = None if self.variance is None else wide(self.variance, 1.0)
+        return replace(self, weights=tuple(weights), mean=mean, variance=variance)
 
     def _forward(self, x: Array) -> Array:
         x = hidden = self._normalized(x)

@@ -231,6 +231,7 @@ COLUMNS = (
     "grade_rad",
     "path_offset_m",
     "gear",
+    "station_m",
 )
 """Channels of a driven trace, in the order of the kernel's rows after the nine cues."""
 
@@ -391,7 +392,14 @@ def start_state(car: CarParameters, road: Road, speed: real) -> State:
 
 @wp.func
 def row_of(
-    car: CarParameters, state: State, cue: Cue, road: Road, command: Commands, gear: Gear, follows: bool
+    car: CarParameters,
+    state: State,
+    cue: Cue,
+    road: Road,
+    command: Commands,
+    gear: Gear,
+    follows: bool,
+    station: real,
 ) -> Row:
     """One sample of the result: nine cues, then :data:`COLUMNS`."""
     row = Row()
@@ -416,6 +424,7 @@ def row_of(
     if not follows:
         row[22] = real(0.0)
     row[23] = real(gear.number + 1)
+    row[24] = station
     return row
 
 
@@ -519,7 +528,7 @@ def drive_all(
             if substep == 0:
                 cue = cues(car, state, derivative(car, state, command), road.slope)
                 result[task.first + sample] = row_of(
-                    car, state, cue, road, command, gear, follows or task.open_loop == 1
+                    car, state, cue, road, command, gear, follows or task.open_loop == 1, station
                 )
             deflection = standing[0]
             state = runge_kutta(car, state, command, dt)

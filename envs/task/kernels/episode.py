@@ -62,6 +62,7 @@ class Arrays:
     core: real_rows
     fixed: real_rows  # the fixed rows in the observation's frame
     memory: float_rows  # low-passed cues of every sample of every drive
+    known: float_rows  # controls and road of every sample of every drive
     bounds: pair_array  # of an observation's entries, and their factors
     observation: float_rows
 
@@ -120,7 +121,7 @@ def look_at(
         shift_frames(a.observation, i, rules.view.frame)
         write_frame(
             rules.view, drives, drive, a.episode[i], which, m, s, a.fixed,
-            a.now, command.own, a.base[i], a.memory, a.bounds, a.observation, i,
+            a.now, command.own, a.base[i], a.memory, a.known, a.bounds, a.observation, i,
         )  # fmt: skip
     return 0
 
@@ -255,6 +256,7 @@ def look_with_adjoint(
     machine_of: int_array,
     drive_of: int_array,
     memory: float_rows,
+    known: float_rows,
     bounds: pair_array,
     now: float_rows,
     own: wp.array(dtype=vec9),
@@ -266,5 +268,5 @@ def look_with_adjoint(
     i = wp.tid()
     write_frame(
         rules.view, drives, drive_of[i], episodes[i], machine_of[i], machines[machine_of[i]], state[i], fixed,
-        now, own[i], vec9(), memory, bounds, out, i,
+        now, own[i], vec9(), memory, known, bounds, out, i,
     )  # fmt: skip

@@ -66,6 +66,11 @@ class ObservationOptions:
             has no loop through the actuators, so their lag and dead time cannot make it swing.
         scaling: "physical": entries in the scale of their row. "typical": over what they usually are, so that
             all have a deviation of about 1, as neural networks need; fixed numbers, no running statistics.
+        against_base: Whether the difference from a machine that the base policy drives alone is added.
+        controls: Whether the driver's steering wheel and pedals and the car's speed and slip are added.
+        road: Times ahead at which the road is seen, by the present speed, s; none for no road.
+        allow_missing: Whether a drive without controls or road is driven all the same: rows that are not
+            known are 0 then, and a row says so. Otherwise such a drive is refused.
     """
 
     preview: Annotated[int, Field(ge=0)] = 0
@@ -79,6 +84,14 @@ class ObservationOptions:
     simulator_cue: Annotated[SimulatorCueSource, renamed("simulator_cue", "felt")] = "machine"
     scaling: Scaling = "physical"
     against_base: bool = False
+    controls: bool = False
+    road: tuple[Positive, ...] = ()
+    allow_missing: bool = False
+
+    @property
+    def knows(self) -> bool:
+        """Whether more is seen of the car than its cues."""
+        return self.controls or bool(self.road)
 
 
 @dataclass(frozen=True)
@@ -97,6 +110,100 @@ class Added:
 def _added(times: Callable[[ObservationOptions, Mode, int], int], *rows: Row) -> tuple[Added, ...]:
     return tuple(Added(row, times) for row in rows)
 
+
+CONTROL_ROWS: Final = (
+    Row(
+        "steering_wheel",
+        1,
+        1.0,
+        "rad",
+        "`observation.controls`: angle of the steering wheel, positive to the right",
+        typical=(0.35,),
+    ),
+    Row("steering_wheel_rate", 1, 1.0, "rad/s", "its rate, through 0.1 s", typical=(0.35,)),
+    Row(
+        "steered_yaw_rate",
+        1,
+        1.0,
+        "rad/s",
+        "yaw rate of the steady turn that this angle asks for in a nominal car",
+        typical=(0.07,),
+    ),
+    Row("steered_force", 1, 10.0, "m/s^2", "lateral acceleration of that turn", typical=(1.0,)),
+    Row("pedals", 2, 1.0, "1", "shares of throttle and brake", typical=(0.25, 0.13)),
+    Row("pedal_rates", 2, 1.0, "1/s", "their rates, through 0.1 s", typical=(0.3, 0.1)),
+    Row("slip_angle", 1, 0.1, "rad", "side slip of the car, positive to the right", typical=(0.01,)),
+    Row("controls_known", 1, 1.0, "1", "1 where wheel and pedals are known", 1.0),
+)
+"""Rows of ``controls``, from the channels :data:`~motion_cueing.envs.cues.CONTROLS` of a drive."""
+
+SPEED_ROWS: Final = (
+    Row(
+        "speed",
+        1,
+        30.0,
+        "m/s",
+        "`observation.controls` or `observation.road`: speed of the car",
+        typical=(20.0,),
+    ),
+    Row("standing", 1, 1.0, "1", "1 where the car stands, falling to 0 at 2 m/s", 1.0, typical=(0.3,)),
+)
+"""Rows of both."""
+
+ROAD_ROWS: Final = (
+    Row(
+        "road_force",
+        1,
+        10.0,
+        "m/s^2",
+        "`observation.road`: v^2 kappa of the road ahead at the present speed, saturating at 6 m/s^2; one "
+        "entry for each time ahead",
+        entries="1 each",
+        typical=(0.8,),
+    ),
+    Row("road_curvature", 1, 0.1, "1/m", "its curvature, likewise", entries="1 each", typical=(0.005,)),
+    Row(
+        "road_grade",
+        1,
+        0.1,
+        "rad",
+        "its slope, positive uphill, likewise",
+        entries="1 each",
+        typical=(0.015,),
+    ),
+    Row(
+        "road_bank",
+        1,
+        0.1,
+        "rad",
+        "its cross slope, right side down positive, likewise",
+        entries="1 each",
+        typical=(0.02,),
+    ),
+    Row(
+        "road_speed",
+        1,
+        10.0,
+        "m/s",
+        "its speed limit less the present speed, likewise",
+        entries="1 each",
+        typical=(11.0,),
+    ),
+    Row(
+        "road_braking",
+        3,
+        10.0,
+        "m/s^2",
+        "deceleration to be in time for: the next stop, bends at 3 m/s^2, a lower limit",
+        typical=(1.6, 0.9, 0.5),
+    ),
+    Row("stop_ahead", 1, 1.0, "1", "1 at a stop, falling to 0 at 100 m before it", 1.0, typical=(0.4,)),
+    Row("road_known", 1, 1.0, "1", "1 where the map is there", 1.0),
+)
+"""Rows of ``road``, from the :class:`~motion_cueing.envs.road.RoadMap` of a drive."""
+
+EACH_TIME: Final = 5
+"""Of them, those with an entry for each time ahead."""
 
 MACHINE: Final = (
     Row(
@@ -285,6 +392,11 @@ ADDED: Final = (
             typical=_TYPICAL_DIFFERENCE,
         ),
     ),
+    # These are contiguous: the columns of ``knowledge.known_rows``.
+    *_added(lambda seen, mode, action: seen.controls, *CONTROL_ROWS),
+    *_added(lambda seen, mode, action: seen.knows, *SPEED_ROWS),
+    *_added(lambda seen, mode, action: len(seen.road), *ROAD_ROWS[:EACH_TIME]),
+    *_added(lambda seen, mode, action: bool(seen.road), *ROAD_ROWS[EACH_TIME:]),
 )
 """The rows after :data:`~motion_cueing.envs.simulator.kernels.observation.ROWS`, in order."""
 
@@ -470,6 +582,8 @@ class View:
 
     frame: int  # entries of a frame
     first: Firsts
+    known: int  # first entry of what is known beside the cues, -1 for nothing
+    expected: int  # entries of the expected cues, the last columns of what is known; 0 for the true ones
     preview_samples: int
     preview_stride: int  # time steps between samples
     cab_frame: int  # whether the machine's rows are turned with the cab's heading
@@ -498,6 +612,8 @@ def view_of(layout: Layout, seen: ObservationOptions, dt: float, noise: tuple[fl
     view.frame = layout.frame
     for added in ADDED:
         setattr(view.first, added.row.name, layout.first(added.row.name))
+    known = [layout.first(row.name) for row in (*CONTROL_ROWS, *SPEED_ROWS)]
+    view.known = min((first for first in known if first >= 0), default=-1)
     view.preview_samples = seen.preview
     view.preview_stride = max(1, round(seen.preview_spacing / dt))
     view.cab_frame, view.modeled = int(seen.frame == "cab"), int(seen.simulator_cue == "model")
@@ -698,6 +814,7 @@ def write_frame(
     command: vec9,
     base: vec9,
     memory: float_rows,
+    known: float_rows,
     bounds: pair_array,
     out: float_rows,
     i: int,
@@ -724,11 +841,20 @@ def write_frame(
         added = axes_in_view(v, s.setpoint, base)
         put_vector(out, i, f.base_action, added, 9, wp.static(UNIT["base_action"]), bounds)
     if f.preview >= 0:
-        put_preview(v, drives, drive, s.sample, bounds, out, i)
+        if v.expected > 0:
+            row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
+            for k in range(v.expected):
+                put_entry(out, i, f.preview + k, real(known[row, known.shape[1] - v.expected + k]), bounds)
+        else:
+            put_preview(v, drives, drive, s.sample, bounds, out, i)
     if f.memory >= 0:
         row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
         for k in range(memory.shape[1]):
             put_entry(out, i, f.memory + k, real(memory[row, k]), bounds)
+    if v.known >= 0:
+        row = drives.first[drive] + wp.min(s.sample, drives.length[drive] - 1)
+        for k in range(known.shape[1] - v.expected):
+            put_entry(out, i, v.known + k, real(known[row, k]), bounds)
     if f.perceived_reference_force >= 0:
         put_perceived(f, s, bounds, out, i)
     if f.true_carriage >= 0:

@@ -1,0 +1,1 @@
+"""Prediction: a network that forecasts a car's cues, supervised on random drives."""
