@@ -73,7 +73,8 @@ class Source(ABC):
     Attributes:
         name: By which it is chosen.
         summary: Program and version it was written for.
-        port: Usual one of the sender's settings; 0 if there is none.
+        port: Where telemetry usually arrives.
+        simulator_port: Where the simulator takes requests; 0 if it takes none.
         layouts: Datagrams that are read.
         tick: Resolution of the sender's clock, s; 0 if it is finer than what matters.
         period: Time after which the sender's clock begins again, s.
@@ -83,6 +84,7 @@ class Source(ABC):
     name: ClassVar[str]
     summary: ClassVar[str]
     port: ClassVar[int] = 0
+    simulator_port: ClassVar[int] = 0
     layouts: ClassVar[tuple[Layout, ...]] = ()
     tick: ClassVar[float] = 0.0
     period: ClassVar[float] = math.inf

@@ -128,7 +128,7 @@ def read_capture(path: Path) -> tuple[dict[int, list[Datagram]], str]:
         reader = dpkt.pcap.UniversalReader(content)
         if reader.datalink() not in _LINKS:
             raise DataError(
-                f"{path}: a capture of link type {reader.datalink()} is not read; capture Ethernet or loopback"
+                f"{path}: link type {reader.datalink()} is not read; capture Ethernet or the loopback"
             )
         link = _LINKS[reader.datalink()](dpkt)
         for time, packet in reader:

@@ -18,16 +18,21 @@ from .layout import Field, Layout
 from .sample import Sample, Source, attitude_of, from_east_up_south
 
 _POSITION: Final = "sim/flightmodel/position/"
-DATAREFS: Final = (
-    "sim/time/total_running_time_sec",
-    *(_POSITION + f"local_a{axis}" for axis in "xyz"),
-    *(_POSITION + name for name in ("P", "Q", "R", "phi", "theta", "psi")),
-    *(_POSITION + f"local_v{axis}" for axis in "xyz"),
-    *(_POSITION + f"local_{axis}" for axis in "xyz"),
-    "sim/time/paused",
-    "sim/time/is_in_replay",
-)
-"""What is asked for; an answer's number is the place here."""
+DATAREFS: Final = {
+    "sim/time/total_running_time_sec": "s",
+    **{_POSITION + f"local_a{axis}": f"m/s², world {axis}: without gravity" for axis in "xyz"},
+    _POSITION + "P": "deg/s, right side down positive",
+    _POSITION + "Q": "deg/s, nose up positive",
+    _POSITION + "R": "deg/s, to the right positive",
+    _POSITION + "phi": "deg, roll, right side down positive",
+    _POSITION + "theta": "deg, pitch, nose up positive",
+    _POSITION + "psi": "deg, heading, to the right positive",
+    **{_POSITION + f"local_v{axis}": f"m/s, world {axis}" for axis in "xyz"},
+    **{_POSITION + f"local_{axis}": f"m, world {axis}" for axis in "xyz"},
+    "sim/time/paused": "1 while paused",
+    "sim/time/is_in_replay": "1 in a replay",
+}
+"""Datarefs that are asked for, with their units; an answer's number is the place here."""
 
 RATE: Final = 100
 """Answers a second that are asked for; X-Plane sends at most one a frame."""
@@ -40,7 +45,11 @@ LAYOUT: Final = Layout(
     (
         Field("magic", "4s", "`RREF`"),
         Field("separator", "1x"),
-        *(field for name in DATAREFS for field in (Field(f"number of {name}", "i"), Field(name, "f"))),
+        *(
+            field
+            for name, meaning in DATAREFS.items()
+            for field in (Field(f"number of {name}", "4x"), Field(name, "f", meaning))
+        ),
     ),
 )
 
@@ -50,7 +59,8 @@ class XPlane(Source):
 
     name = "xplane"
     summary = "X-Plane 11 and 12, RREF"
-    port = 49000
+    port = 49010
+    simulator_port = 49000
     layouts = (LAYOUT,)
 
     def requests(self) -> tuple[bytes, ...]:
