@@ -40,6 +40,7 @@ from .plausibility import (
     check_constancy,
     check_fastest,
     check_gravity,
+    check_senses,
     check_slopes,
     silent_stretches,
 )
@@ -183,6 +184,8 @@ def import_recording(
 ) -> ImportedLog:
     """Turn a recording into cues, as :func:`import_log` does; ``source`` is the file, for messages."""
     options = options or ImportOptions()
+    if recording.car_axes:
+        options = _in_car(options)
     selection = select_columns(recording, columns, units or {}, options)
     changes = list(recording.changes)
     logs = []
@@ -229,12 +232,23 @@ def import_recording(
         raw, options, change = with_rates(raw, grid, options)
         changes.append(change)
     findings = _find(raw, grid, timing, changes, selection.units, options)
+    if recording.car_axes and options.slopes == "refuse":
+        check_senses(findings.slopes)
     return ImportedLog(
         trace=_trace(name, Path(source).name, raw, grid, findings, options),
         findings=replace(findings, format=recording.format, selection=tuple(selection.lines())),
         raw_force=_stacked(raw, FORCES)[:: grid.every],
         raw_rate=_stacked(raw, RATES)[:: grid.every],
     )
+
+
+def _in_car(options: ImportOptions) -> ImportOptions:
+    """Options for signals in the car's own axes: nothing is estimated that is not given."""
+    known = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "gravity_m_s2": GRAVITY, "speed_delay_s": 0.0}
+    known |= {"rate_bias_deg_s": (0.0, 0.0, 0.0)}
+    missing = {name: value for name, value in known.items() if getattr(options, name) is None}
+    signs = {name: "keep" for name in ("lateral_sign", "rate_sign") if getattr(options, name) == "estimate"}
+    return replace(options, **missing, **signs)  # type: ignore[arg-type]
 
 
 def select_columns(

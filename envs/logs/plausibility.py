@@ -50,12 +50,14 @@ class Slope:
         least: Slope of the regression of the first on the second: too flat where the second is noisy.
         most: The inverse regression's: too steep where the first has other causes.
         judged: Whether both vary enough, and alike enough, to be judged.
+        opposite: Whether they vary enough, and the first falls where the second rises.
     """
 
     correlation: float
     least: float
     most: float
     judged: bool
+    opposite: bool = False
 
     @property
     def likely(self) -> float:
@@ -74,8 +76,8 @@ def slope(measured: Floats, expected: Floats, least_variation: float) -> Slope:
     if found == 0.0:
         return Slope(0.0, 0.0, 0.0, False)
     ratio = float(measured.std() / expected.std())
-    judged = found >= _SURE and max(measured.std(), expected.std()) >= least_variation
-    return Slope(found, found * ratio, ratio / found, judged)
+    varied = bool(max(measured.std(), expected.std()) >= least_variation)
+    return Slope(found, found * ratio, ratio / found, found >= _SURE and varied, found <= -_SURE and varied)
 
 
 @dataclass(frozen=True)
@@ -267,6 +269,21 @@ def check_slopes(slopes: Slopes) -> None:
         f"{shown}, expected 1: the {signal} {'are' if signal == 'rates' else 'is'} off by a factor of "
         f"{factor:.3g}{_likely_factor(signal, factor)}; declare the unit, or set slopes='accept'"
     )
+
+
+def check_senses(slopes: Slopes) -> None:
+    """Refuse signals in the car's own axes whose signs disagree; other devices have theirs estimated.
+
+    Raises:
+        DataError: names the pair that disagrees.
+    """
+    found = {"f_x on dv/dt": slopes.along, "f_y on v r": slopes.across, "heading on course": slopes.heading}
+    opposite = [name for name, one in found.items() if one is not None and one.opposite]
+    if opposite:
+        raise DataError(
+            f"{' and '.join(opposite)}: the first falls where the second rises, so a sign is wrong; reverse "
+            "its column (force_y=-force_y), or set slopes='accept'"
+        )
 
 
 def _likely_factor(signal: str, factor: float) -> str:

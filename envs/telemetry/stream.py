@@ -126,18 +126,23 @@ def read_capture(path: Path) -> tuple[dict[int, list[Datagram]], str]:
     content, fault = io.BytesIO(_content(path)), ""
     try:
         reader = dpkt.pcap.UniversalReader(content)
-        if reader.datalink() not in _LINKS:
-            raise DataError(
-                f"{path}: link type {reader.datalink()} is not read; capture Ethernet or the loopback"
-            )
-        link = _LINKS[reader.datalink()](dpkt)
+    except (ValueError, struct.error) as error:
+        raise DataError(f"{path}: no capture that can be read ({error})") from None
+    if reader.datalink() not in _LINKS:
+        raise DataError(
+            f"{path}: link type {reader.datalink()} is not read; capture Ethernet or the loopback"
+        )
+    link = _LINKS[reader.datalink()](dpkt)
+    try:
         for time, packet in reader:
             layer: Any = None
             with contextlib.suppress(dpkt.UnpackError, struct.error, IndexError):
                 layer = link(packet)
             while isinstance(layer, dpkt.Packet) and not isinstance(layer, dpkt.udp.UDP):
                 layer = layer.data
-            if isinstance(layer, dpkt.udp.UDP):
+            if isinstance(layer, dpkt.udp.UDP) and len(layer.data) < layer.ulen - 8:
+                fault = f"the capture is cut off within a packet to port {layer.dport}"
+            elif isinstance(layer, dpkt.udp.UDP):
                 flows.setdefault(int(layer.dport), []).append(Datagram(float(time), bytes(layer.data)))
     except (ValueError, struct.error, dpkt.Error) as error:
         fault = f"the capture is damaged ({error})"

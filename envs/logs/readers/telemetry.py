@@ -94,7 +94,9 @@ def _recording(path: Path, source: Source, datagrams: Sequence[Datagram], change
         for name, values in zip(_UNITS, table.T, strict=True)
         if np.isfinite(values).any()
     ]
-    return Recording(f"telemetry, {source.summary}", (Table("", tuple(columns), "time"),), (*changes, *said))
+    return Recording(
+        f"telemetry, {source.summary}", (Table("", tuple(columns), "time"),), (*changes, *said), True
+    )
 
 
 def _table(samples: Sequence[tuple[float, Sample]]) -> Floats:

@@ -37,9 +37,8 @@ def cues_of(name, motion, **options):
 
 
 def expected(motion):
-    """The cues in the middle of the two; what does not change is exact."""
-    first, second = motion, later(motion, DT)
-    return np.concatenate([0.5 * (first.force() + second.force()), motion.rate])
+    """The cues at the second of the two; acceleration and rate do not change in between."""
+    return np.concatenate([later(motion, DT).force(), motion.rate])
 
 
 # One cause at a time: the sign of each cue in words.
@@ -83,10 +82,9 @@ motions = st.builds(
 @pytest.mark.parametrize("name", NAMES)
 @given(motion=motions)
 def test_any_motion_comes_back(name, motion):
-    # Stamps in milliseconds leave 6 % of a step of 1/64 s; only differences feel that.
     found = cues_of(name, motion)
-    by_differences = name in ("f1", "dirt")
-    np.testing.assert_allclose(found, expected(motion), atol=0.15 if by_differences else 0.09)
+    # Directions in whole numbers and single floats leave noise in what is the difference of two datagrams.
+    np.testing.assert_allclose(found, expected(motion), atol=0.05 if name in ("f1", "dirt") else 3e-3)
     second = later(motion, DT)
     sample = get_source(name).parse(PACK[name](second))
     if name not in ("mcgc", "forza"):
