@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -244,11 +244,11 @@ def import_recording(
 
 def _in_car(options: ImportOptions) -> ImportOptions:
     """Options for signals in the car's own axes: nothing is estimated that is not given."""
-    known = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "gravity_m_s2": GRAVITY, "speed_delay_s": 0.0}
-    known |= {"rate_bias_deg_s": (0.0, 0.0, 0.0)}
-    missing = {name: value for name, value in known.items() if getattr(options, name) is None}
-    signs = {name: "keep" for name in ("lateral_sign", "rate_sign") if getattr(options, name) == "estimate"}
-    return replace(options, **missing, **signs)  # type: ignore[arg-type]
+    known: dict[str, Any] = dict.fromkeys(("roll_deg", "pitch_deg", "yaw_deg", "speed_delay_s"), 0.0)
+    known |= {"gravity_m_s2": GRAVITY, "rate_bias_deg_s": (0.0, 0.0, 0.0)}
+    given = {name: value for name, value in known.items() if getattr(options, name) is None}
+    given |= {name: "keep" for name in ("lateral_sign", "rate_sign") if getattr(options, name) == "estimate"}
+    return replace(options, **given)
 
 
 def select_columns(

@@ -31,7 +31,7 @@ def test_a_game_over_the_loopback_leaves_recording_and_report(tmp_path, capsys):
         begin = time.perf_counter()
         while not over.is_set():
             now = time.perf_counter() - begin
-            motion = Motion(time=now, velocity=(10.0, 0.0, 0.0), acceleration=(0.5, 0.0, 0.0))
+            motion = Motion(time=now, velocity=(10.0 + 0.5 * now, 0.0, 0.0), acceleration=(0.5, 0.0, 0.0))
             game.send(games.forza(motion), ("127.0.0.1", port))
             game.send(b"noise", ("127.0.0.1", port))
             over.wait(1 / 60)
