@@ -1,7 +1,7 @@
 """The spectrum of a game's cues behind the bridge: is a beat of 60 Hz against the policy's 100 Hz left?
 
 `python -m benchmarks.bridge_spectrum` sends a tone of 3 Hz and 1 m/s^2 as a game at 60 frames a second with
-stamps in milliseconds, whose datagrams are up to 4 ms late, and takes the cues as a policy does, 100 times a second.
+stamps in milliseconds. Its datagrams are up to 4 ms late. Cues are taken 100 times a second, as policies do.
 It prints the largest line that is not the tone's, for frames that are held and for each smoothing;
 `--out FILE.png` draws the spectra.
 """
