@@ -170,7 +170,11 @@ def _run(command: BridgeCommand, bridge: Bridge, loop: BridgeLoop, address: Addr
             f"{command.source}: UDP {host}:{port}, {command.rate} packets a second to {command.to}",
             flush=True,
         )
-        loop.run(ends)
+        try:
+            loop.run(ends)
+        except KeyboardInterrupt:
+            # Ctrl-C a second time; what was counted is shown all the same.
+            print("stopped", file=sys.stderr)
 
 
 def _finish(command: BridgeCommand, bridge: Bridge, loop: BridgeLoop) -> None:

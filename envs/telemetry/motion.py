@@ -111,7 +111,7 @@ class MotionCheck:
         along = float(north * change[0] + east * change[1]) / speed
         pairs = np.array([[moving[0], along], [moving[1], speed * turning], [cues[5], turning]])
         self._smooth += (pairs - self._smooth) * min(dt / _SMOOTHED_S, 1.0)
-        for sums, (found, expected) in zip(self._sums.values(), self._smooth, strict=True):
+        for sums, (found, expected) in zip(self._sums.values(), self._smooth.tolist(), strict=True):
             sums[0] += dt
             sums[1] += dt * expected * expected
             sums[2] += dt * expected * found
