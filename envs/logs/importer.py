@@ -37,6 +37,7 @@ from .mounting import (
 )
 from .plausibility import (
     Slopes,
+    check_axes,
     check_constancy,
     check_fastest,
     check_gravity,
@@ -329,10 +330,13 @@ def _find(
         options.standstill_m_s,
     )
     check_fastest(evidence, units)
+    recorded = evidence
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
     evidence = evidence.delayed(delay)
     check_constancy(evidence, options)
     check_gravity(evidence, options)
+    if options.slopes == "refuse":
+        check_axes(recorded)
     check_standstill(evidence)
     device = estimate(evidence, options)
     if options.speed_delay_s is None and delay >= LONGEST_DELAY_S - 1e-6:

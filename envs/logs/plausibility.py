@@ -9,15 +9,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cues import GRAVITY, Floats
 from ..errors import DataError
-from .mounting import Evidence, Mounting, correlation, detrended, rest_force, turn, weightless
+from .mounting import (
+    LONGEST_DELAY_S,
+    Evidence,
+    Mounting,
+    correlation,
+    detrended,
+    level,
+    rest_force,
+    turn,
+    weightless,
+)
 from .signals import ImportOptions
 from .units import RATES, UNITS
+
+Fit: TypeAlias = NDArray[np.complex128]
 
 GRAVITY_TOLERANCE: Final = 0.5
 """Gravity as a device measures it may differ by so much from 9.81 or from the one given, m/s^2."""
@@ -216,6 +229,98 @@ def _tilt_of_motion(evidence: Evidence, part: slice) -> float:
     speed = evidence.speed[part]
     turning = np.linalg.norm(np.mean(speed[:, None] * evidence.rate[part], axis=0))
     return math.atan((abs(speed[-1] - speed[0]) / _PART_S + float(turning)) / GRAVITY)
+
+
+_AXES_S: Final = 8.0
+"""Length of the parts whose axes are compared, s."""
+_EXCITED: Final = 0.5
+"""Root mean square of dv/dt and v r together from which a part shows its axes, m/s^2."""
+_OWN_FIT, _WORSE_FIT = 0.9, 0.3
+"""Axes have changed where a part's own turn fits at least so well, and that of all before by so much less."""
+_DELAYS: Final = tuple(np.arange(0.0, LONGEST_DELAY_S + 0.05, 0.1).tolist())
+_TURNS: Final = (0.05, 0.8)
+"""Root mean square of a yaw rate that shows its sense, rad/s, and the correlation that does."""
+
+
+def check_axes(evidence: Evidence) -> None:
+    """Refuse axes that change during the drive: a device that slipped, or columns that were swapped.
+
+    The horizontal force is compared with (dv/dt, v r), part by part, as complex numbers: the force of a part
+    is that motion turned by one angle, or its mirror image. The delay of the speed is the one with which
+    the parts fit best, each for itself, since that of the whole drive supposes that nothing changes.
+
+    Args:
+        evidence: With the speed as it was recorded, late.
+
+    Raises:
+        DataError: with the time from the beginning of what is imported.
+    """
+    if evidence.speed is None:
+        return
+    leveled = Mounting(*level(rest_force(evidence)[0]))
+    planar = leveled.force_in_car(evidence.force)[:, :2] @ [1.0, 1.0j]
+    rate = leveled.rate_in_car(evidence.rate)[:, 2]
+    trials = [_parts(evidence.delayed(delay), planar, rate) for delay in _DELAYS]
+    parts = max(trials, key=lambda found: sum(float(np.abs(fit).max()) for _, fit in found))
+    before = np.zeros(2, dtype=np.complex128)
+    for when, fit in parts:
+        if (
+            np.any(before)
+            and np.abs(fit).max() >= _OWN_FIT
+            and _fit_of(fit, before) <= (np.abs(fit).max() - _WORSE_FIT)
+        ):
+            raise DataError(
+                f"the axes of the force change at about {when:.0f} s of the import: it follows dv/dt and v r "
+                "in another direction than before; the device moved, or columns are swapped there; leave one "
+                "part out with start_s or end_s, or set slopes='accept'"
+            )
+        before += fit
+    _check_sense(evidence, rate)
+
+
+def _parts(evidence: Evidence, planar: NDArray[np.complex128], rate: Floats) -> list[tuple[float, Fit]]:
+    """Begin, s, and fit of each part that shows its axes.
+
+    A fit is the product of the force with the motion and with its mirror image, of length 1 where it is that
+    motion. Its angle is the turn between both.
+    """
+    motion = evidence.speed_rate + 1.0j * turn(evidence, rate[: len(evidence.rate)])
+    length, found = int(_AXES_S / evidence.dt), []
+    for first in range(0, len(motion) - length + 1, length):
+        force, expected = (values[first : first + length] for values in (planar, motion))
+        force, expected = force - force.mean(), expected - expected.mean()
+        size = float(np.linalg.norm(force) * np.linalg.norm(expected))
+        if size > 0.0 and float(np.linalg.norm(expected)) >= _EXCITED * math.sqrt(length):
+            fit = np.array([np.vdot(expected, force), np.vdot(expected.conj(), force)]) / size
+            found.append((first * evidence.dt, fit))
+    return found
+
+
+def _fit_of(fit: Fit, before: Fit) -> float:
+    """How well a part (2,) has the turn of the parts before it (2,)."""
+    sizes = np.abs(before)
+    # Where both fit alike, the drive so far does not show whether the axes are mirrored.
+    likely = sizes >= 0.9 * sizes.max()
+    return float(np.real(fit * before.conj() / np.maximum(sizes, 1e-12))[likely].max())
+
+
+def _check_sense(evidence: Evidence, rate: Floats) -> None:
+    """Refuse a yaw rate whose sense against the course changes during the drive."""
+    if evidence.course is None:
+        return
+    turning = np.gradient(evidence.course, evidence.dt)
+    length, senses = int(_AXES_S / evidence.dt), dict[float, float]()
+    for first in range(0, len(rate) - length + 1, length):
+        part = slice(first, first + length)
+        alike = correlation(rate[part], turning[part])
+        if turning[part].std() >= _TURNS[0] and abs(alike) >= _TURNS[1]:
+            senses[first * evidence.dt] = float(np.sign(alike))
+    changed = [when for when, sense in senses.items() if sense != next(iter(senses.values()))]
+    if changed:
+        raise DataError(
+            f"the sense of the rates against the course changes at about {changed[0]:.0f} s of the import; "
+            "leave one part out with start_s or end_s, or set slopes='accept'"
+        )
 
 
 def check_fastest(evidence: Evidence, units: Mapping[str, str]) -> None:
