@@ -258,7 +258,8 @@ def check_axes(evidence: Evidence) -> None:
     if evidence.speed is None:
         return
     leveled = Mounting(*level(rest_force(evidence)[0]))
-    planar = leveled.force_in_car(evidence.force)[:, :2] @ [1.0, 1.0j]
+    forward, right, _ = leveled.force_in_car(evidence.force).T
+    planar = np.asarray(forward + 1.0j * right, dtype=np.complex128)
     rate = leveled.rate_in_car(evidence.rate)[:, 2]
     trials = [_parts(evidence.delayed(delay), planar, rate) for delay in _DELAYS]
     parts = max(trials, key=lambda found: sum(float(np.abs(fit).max()) for _, fit in found))
@@ -291,8 +292,8 @@ def _parts(evidence: Evidence, planar: NDArray[np.complex128], rate: Floats) -> 
         force, expected = force - force.mean(), expected - expected.mean()
         size = float(np.linalg.norm(force) * np.linalg.norm(expected))
         if size > 0.0 and float(np.linalg.norm(expected)) >= _EXCITED * math.sqrt(length):
-            fit = np.array([np.vdot(expected, force), np.vdot(expected.conj(), force)]) / size
-            found.append((first * evidence.dt, fit))
+            products = [np.vdot(expected, force), np.vdot(expected.conj(), force)]
+            found.append((first * evidence.dt, np.asarray(products, dtype=np.complex128) / size))
     return found
 
 
