@@ -27,6 +27,7 @@ from .mounting import (
     LONGEST_DELAY_S,
     Estimate,
     Mounting,
+    YawUnknownError,
     correlation,
     detrended,
     estimate,
@@ -335,10 +336,14 @@ def _find(
     evidence = evidence.delayed(delay)
     check_constancy(evidence, options)
     check_gravity(evidence, options)
-    if options.slopes == "refuse":
-        check_axes(recorded)
     check_standstill(evidence)
-    device = estimate(evidence, options)
+    try:
+        device = estimate(evidence, options)
+    except YawUnknownError:
+        # Axes that change are a better reason than none that shows.
+        if options.slopes == "refuse":
+            check_axes(recorded)
+        raise
     if options.speed_delay_s is None and delay >= LONGEST_DELAY_S - 1e-6:
         note = (
             f"the delay of the speed is at the end of its range of {LONGEST_DELAY_S:g} s: check speed and "
@@ -350,6 +355,7 @@ def _find(
     slopes = Slopes.of(evidence, device.mounting)
     if options.slopes == "refuse":
         check_slopes(slopes)
+        check_axes(recorded)
     gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
     return Findings(
         timing, device, slopes, delay, gravity, tuple(change.later(grid.start) for change in changes)

@@ -22,6 +22,10 @@ from .signals import ImportOptions, Sign, low_pass
 from .units import FORCES
 
 
+class YawUnknownError(DataError):
+    """A record that does not show how the device is turned in the car."""
+
+
 @dataclass(frozen=True)
 class Mounting:
     """Attitude of a device in the car, and the signs of its axes.
@@ -259,7 +263,8 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     """Mounting and biases, each as given in ``options`` or else from the record.
 
     Raises:
-        DataError: the yaw of the mounting is not given and the record does not show it.
+        YawUnknownError: the yaw of the mounting is not given and the record does not show it.
+        DataError: a horizontal force is missing, which would show it.
     """
     rest, rest_from = rest_force(evidence)
     roll, pitch = (
@@ -277,7 +282,7 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     bias, bias_from = _rate_bias(evidence, mounting, options)
     force_speed, force_turn = _agreement(evidence, mounting)
     if options.yaw_deg is None and max(force_speed, force_turn) < CLEAR:
-        raise DataError(
+        raise YawUnknownError(
             f"yaw_deg: the record does not show how the device is turned in the car (f_x with dv/dt "
             f"{force_speed:.2f}, f_y with v r {force_turn:.2f}); give yaw_deg, or name a column for speed"
         )
