@@ -238,6 +238,8 @@ _EXCITED: Final = 0.5
 _OWN_FIT, _WORSE_FIT = 0.9, 0.3
 """Axes have changed where a part's own turn fits at least so well, and that of all before by so much less."""
 _DELAYS: Final = tuple(np.arange(0.0, LONGEST_DELAY_S + 0.05, 0.1).tolist())
+_MISSING: Final = 1e-3
+"""A horizontal force that varies by less is a constant, whose axis shows nothing, m/s^2."""
 _TURNS: Final = (0.05, 0.8)
 """Root mean square of a yaw rate that shows its sense, rad/s, and the correlation that does."""
 
@@ -259,6 +261,8 @@ def check_axes(evidence: Evidence) -> None:
         return
     leveled = Mounting(*level(rest_force(evidence)[0]))
     forward, right, _ = leveled.force_in_car(evidence.force).T
+    if min(forward.std(), right.std()) < _MISSING:
+        return
     planar = np.asarray(forward + 1.0j * right, dtype=np.complex128)
     rate = leveled.rate_in_car(evidence.rate)[:, 2]
     trials = [_parts(evidence.delayed(delay), planar, rate) for delay in _DELAYS]
