@@ -237,6 +237,8 @@ _EXCITED: Final = 0.5
 """Root mean square of dv/dt and v r together from which a part shows its axes, m/s^2."""
 _OWN_FIT, _WORSE_FIT = 0.9, 0.3
 """Axes have changed where a part's own turn fits at least so well, and that of all before by so much less."""
+_ALIKE: Final = 0.7
+"""The motion and its mirror image fit alike down to this ratio: v r has a sixth of the power of dv/dt."""
 _DELAYS: Final = tuple(np.arange(0.0, LONGEST_DELAY_S + 0.05, 0.1).tolist())
 _MISSING: Final = 1e-3
 """A horizontal force that varies by less is a constant, whose axis shows nothing, m/s^2."""
@@ -305,7 +307,7 @@ def _fit_of(fit: Fit, before: Fit) -> float:
     """How well a part (2,) has the turn of the parts before it (2,)."""
     sizes = np.abs(before)
     # Where both fit alike, the drive so far does not show whether the axes are mirrored.
-    likely = sizes >= 0.9 * sizes.max()
+    likely = sizes >= _ALIKE * sizes.max()
     return float(np.real(fit * before.conj() / np.maximum(sizes, 1e-12))[likely].max())
 
 
