@@ -270,11 +270,13 @@ def check_axes(evidence: Evidence) -> None:
     trials = [_parts(evidence.delayed(delay), planar, rate) for delay in _DELAYS]
     parts = max(trials, key=lambda found: sum(float(np.abs(fit).max()) for _, fit in found))
     before = np.zeros(2, dtype=np.complex128)
-    for when, fit in parts:
+    for place, (when, fit) in enumerate(parts):
+        # A change lasts: no later part has the turn of before again.
+        later = [one for _, one in parts[place:]]
         if (
             np.any(before)
             and np.abs(fit).max() >= _OWN_FIT
-            and _fit_of(fit, before) <= (np.abs(fit).max() - _WORSE_FIT)
+            and not any(_agrees(one, before) for one in later)
         ):
             raise DataError(
                 f"the axes of the force change at about {when:.0f} s of the import: it follows dv/dt and v r "
@@ -309,6 +311,11 @@ def _fit_of(fit: Fit, before: Fit) -> float:
     # Where both fit alike, the drive so far does not show whether the axes are mirrored.
     likely = sizes >= _ALIKE * sizes.max()
     return float(np.real(fit * before.conj() / np.maximum(sizes, 1e-12))[likely].max())
+
+
+def _agrees(fit: Fit, before: Fit) -> bool:
+    """Whether a part (2,) fits nearly as well with the turn of the parts before it as with its own."""
+    return _fit_of(fit, before) > float(np.abs(fit).max()) - _WORSE_FIT
 
 
 def _check_sense(evidence: Evidence, rate: Floats) -> None:
