@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class ListCommand:
-    """Show every name that a command accepts: policies, maneuvers, motion bases, cars and algorithms."""
+    """Show every name that a command accepts: policies, maneuvers, motion bases, cars and more."""
 
 
 def run(command: ListCommand) -> int:
@@ -32,6 +32,7 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
     """Titles, each with names and one line about each."""
     from .. import baselines as policies
     from ..envs import car, maneuvers, platform
+    from ..envs.telemetry import SOURCES
     from ..train import agents  # noqa: F401  (registers them)
     from ..train.registry import ALGORITHMS
 
@@ -45,6 +46,7 @@ def catalogue() -> list[tuple[str, list[tuple[str, str]]]]:
             platform.describe_platform,
         ),
         ("Cars", car.car_names(), car.describe_car),
+        ("Sources of telemetry", SOURCES.names(), SOURCES.description),
         ("Training algorithms", ALGORITHMS.names(), ALGORITHMS.description),
     ]
     return [(title, [(name, describe(name)) for name in names]) for title, names, describe in kinds]

@@ -229,6 +229,14 @@ COMMANDS: Final[Mapping[str, Command]] = {
         "`motion-cueing drive` in another terminal sends it cues",
         announces=False,
     ),
+    "bridge": Command(
+        ".bridge",
+        "BridgeCommand",
+        "send a simulator's or game's telemetry to such a controller",
+        "--from forza --listen 5300 --to 127.0.0.1:47100",
+        "docs/guides/bridge.md has the settings of each game",
+        announces=False,
+    ),
     "drive": Command(
         ".serve",
         "DriveCommand",

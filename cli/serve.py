@@ -268,7 +268,7 @@ def _announce(command: ServeCommand, endpoint: Endpoint) -> None:
 
 
 @contextmanager
-def _terminated_gently() -> Iterator[None]:
+def terminated_gently() -> Iterator[None]:
     """Take SIGTERM for Ctrl-C within the block; only the main thread can."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -294,7 +294,7 @@ def _run(command: ServeCommand, server: Server, endpoint: Endpoint) -> None:
             print("stopping: the machine brakes and returns to neutral ...", file=sys.stderr, flush=True)
         return stopping
 
-    with interrupt.caught(), _terminated_gently(), undisturbed(command.cpu, command.priority):
+    with interrupt.caught(), terminated_gently(), undisturbed(command.cpu, command.priority):
         # Whoever reads it may stop the controller at once.
         _announce(command, endpoint)
         try:

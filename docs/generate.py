@@ -191,6 +191,22 @@ def link_packages() -> None:
             (folder / name).symlink_to(DOCS.parent / name)
 
 
+def telemetry() -> str:
+    """Every protocol that the bridge reads, with the bytes that it takes."""
+    from motion_cueing.envs.telemetry import get_source, source_names
+
+    sources = [get_source(name) for name in source_names()]
+    rows = [(f"[`{one.name}`](#{one.name})", one.summary, one.uncertain or "nothing") for one in sources]
+    parts = [table(("protocol", "program", "left open by its description"), rows)]
+    for source in sources:
+        parts.append(f"### {source.name}\n")
+        for layout in source.layouts:
+            rows = [(f"`{field}`", place, kind, meaning) for place, kind, field, meaning in layout.rows()]
+            title = f"{layout.name}, {layout.size} bytes:"
+            parts.append(f"{title}\n\n" + table(("field", "bytes", "type", "meaning"), rows))
+    return "\n".join(parts)
+
+
 def learning_tasks() -> str:
     """The file of the task `cueing`."""
     file = resources.files("motion_cueing.envs.task") / "presets" / "cueing.yaml"
@@ -208,6 +224,7 @@ def write_tables() -> None:
         **configuration_tables(),
         "observation-rows": observation_table(),
         "learning-tasks": learning_tasks(),
+        "telemetry": telemetry(),
         "reward-terms": reward_table(),
         "action-scale": action_table(),
         "command-line": command_line(),

@@ -135,6 +135,8 @@ class Guard:
         self._slew = np.array([o.force_slew, o.force_slew, o.vertical_slew, *3 * [o.rate_slew]])
         self._blend = Blend(np.repeat([o.jerk, o.angular_acceleration], 3))
         self.counts = dict.fromkeys(GUARD_KINDS, 0)
+        # A sender's pause goes on while the machine brakes: it counts once.
+        self._paused = False
         self.reset()
 
     def reset(self) -> None:
@@ -146,7 +148,7 @@ class Guard:
         self._since_good = self._calm = 0.0
         self._frozen = np.zeros(2)
         self._suspects = self._waited = 0
-        self._paused = self._copied = False
+        self._copied = False
         self._trend = np.zeros(6)
         self._heard: deque[Floats] = deque(maxlen=_TREND)
         self.follows = True

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from .mounting import (
     LONGEST_DELAY_S,
     Estimate,
     Mounting,
+    YawUnknownError,
     correlation,
     detrended,
     estimate,
@@ -37,9 +38,11 @@ from .mounting import (
 )
 from .plausibility import (
     Slopes,
+    check_axes,
     check_constancy,
     check_fastest,
     check_gravity,
+    check_senses,
     check_slopes,
     silent_stretches,
 )
@@ -183,6 +186,8 @@ def import_recording(
 ) -> ImportedLog:
     """Turn a recording into cues, as :func:`import_log` does; ``source`` is the file, for messages."""
     options = options or ImportOptions()
+    if recording.car_axes:
+        options = _in_car(options)
     selection = select_columns(recording, columns, units or {}, options)
     changes = list(recording.changes)
     logs = []
@@ -229,12 +234,23 @@ def import_recording(
         raw, options, change = with_rates(raw, grid, options)
         changes.append(change)
     findings = _find(raw, grid, timing, changes, selection.units, options)
+    if recording.car_axes and options.slopes == "refuse":
+        check_senses(findings.slopes)
     return ImportedLog(
         trace=_trace(name, Path(source).name, raw, grid, findings, options),
         findings=replace(findings, format=recording.format, selection=tuple(selection.lines())),
         raw_force=_stacked(raw, FORCES)[:: grid.every],
         raw_rate=_stacked(raw, RATES)[:: grid.every],
     )
+
+
+def _in_car(options: ImportOptions) -> ImportOptions:
+    """Options for signals in the car's own axes: nothing is estimated that is not given."""
+    known: dict[str, Any] = dict.fromkeys(("roll_deg", "pitch_deg", "yaw_deg", "speed_delay_s"), 0.0)
+    known |= {"gravity_m_s2": GRAVITY, "rate_bias_deg_s": (0.0, 0.0, 0.0)}
+    given = {name: value for name, value in known.items() if getattr(options, name) is None}
+    given |= {name: "keep" for name in ("lateral_sign", "rate_sign") if getattr(options, name) == "estimate"}
+    return replace(options, **given)
 
 
 def select_columns(
@@ -315,12 +331,19 @@ def _find(
         options.standstill_m_s,
     )
     check_fastest(evidence, units)
+    recorded = evidence
     delay = speed_delay(evidence) if options.speed_delay_s is None else options.speed_delay_s
     evidence = evidence.delayed(delay)
     check_constancy(evidence, options)
     check_gravity(evidence, options)
     check_standstill(evidence)
-    device = estimate(evidence, options)
+    try:
+        device = estimate(evidence, options)
+    except YawUnknownError:
+        # Axes that change are a better reason than none that shows.
+        if options.slopes == "refuse":
+            check_axes(recorded)
+        raise
     if options.speed_delay_s is None and delay >= LONGEST_DELAY_S - 1e-6:
         note = (
             f"the delay of the speed is at the end of its range of {LONGEST_DELAY_S:g} s: check speed and "
@@ -332,6 +355,7 @@ def _find(
     slopes = Slopes.of(evidence, device.mounting)
     if options.slopes == "refuse":
         check_slopes(slopes)
+        check_axes(recorded)
     gravity = float(np.linalg.norm(device.rest)) if options.gravity_m_s2 is None else options.gravity_m_s2
     return Findings(
         timing, device, slopes, delay, gravity, tuple(change.later(grid.start) for change in changes)

@@ -22,6 +22,10 @@ from .signals import ImportOptions, Sign, low_pass
 from .units import FORCES
 
 
+class YawUnknownError(DataError):
+    """A record that does not show how the device is turned in the car."""
+
+
 @dataclass(frozen=True)
 class Mounting:
     """Attitude of a device in the car, and the signs of its axes.
@@ -125,7 +129,20 @@ class Evidence:
         return np.asarray(np.gradient(self.speed, self.dt))
 
     def delayed(self, delay: float) -> Evidence:
-        """The evidence with speed and course moved ``delay`` seconds earlier."""
+        """The evidence with speed and course moved ``delay`` seconds earlier, up to their last values."""
+        whole = self._moved(delay)
+        # At the end, nothing is known of the speed; half of the drive is kept in any case.
+        kept = max(len(self.force) - round(max(delay, 0.0) / self.dt), len(self.force) // 2)
+        return replace(
+            whole,
+            force=whole.force[:kept],
+            rate=whole.rate[:kept],
+            speed=None if whole.speed is None else whole.speed[:kept],
+            course=None if whole.course is None else whole.course[:kept],
+            still=whole.still[:kept],
+        )
+
+    def _moved(self, delay: float) -> Evidence:
         still = shift(self.still.astype(np.float64), delay, self.dt) > 0.5
         speed = None if self.speed is None else shift(self.speed, delay, self.dt)
         course = None if self.course is None else shift(self.course, delay, self.dt)
@@ -171,7 +188,7 @@ def speed_delay(evidence: Evidence) -> float:
 
     The forward axis is not known yet, so dv/dt is regressed on all three axes of the force. At constant
     speed, the rate of the course is regressed on all three axes of the rates. A signal that hardly varies
-    shows no delay.
+    shows no delay. The course is the second choice: it leads the heading by the slip of the rear axle.
     """
     if evidence.speed is not None and evidence.speed_rate.std() >= _LEAST_SPEED_RATE:
         return _best_delay(evidence.force, evidence.speed_rate, evidence.dt)
@@ -183,9 +200,12 @@ def speed_delay(evidence: Evidence) -> float:
 
 
 def _best_delay(axes: Floats, target: Floats, dt: float) -> float:
-    basis = np.linalg.qr(np.column_stack([axes, np.ones(len(axes))]))[0]
+    """The delay at which the axes (n, 3) explain most of the variance of the target (n,), s."""
     delays = np.arange(0.0, LONGEST_DELAY_S + _DELAY_STEP_S / 2, _DELAY_STEP_S)
-    fits = [_explained(basis, shift(target, delay, dt)) for delay in delays]
+    # The same rows for each delay, and none for which the target is not known.
+    kept = max(len(axes) - round(LONGEST_DELAY_S / dt), len(axes) // 2)
+    basis = np.linalg.qr(np.column_stack([axes[:kept], np.ones(kept)]))[0]
+    fits = [_explained(basis, shift(target, delay, dt)[:kept]) for delay in delays]
     best = int(np.argmax(fits))
     return float(delays[best]) if fits[best] > _WEAK_FIT else 0.0
 
@@ -243,7 +263,8 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     """Mounting and biases, each as given in ``options`` or else from the record.
 
     Raises:
-        DataError: the yaw of the mounting is not given and the record does not show it.
+        YawUnknownError: the yaw of the mounting is not given and the record does not show it.
+        DataError: a horizontal force is missing, which would show it.
     """
     rest, rest_from = rest_force(evidence)
     roll, pitch = (
@@ -261,7 +282,7 @@ def estimate(evidence: Evidence, options: ImportOptions) -> Estimate:
     bias, bias_from = _rate_bias(evidence, mounting, options)
     force_speed, force_turn = _agreement(evidence, mounting)
     if options.yaw_deg is None and max(force_speed, force_turn) < CLEAR:
-        raise DataError(
+        raise YawUnknownError(
             f"yaw_deg: the record does not show how the device is turned in the car (f_x with dv/dt "
             f"{force_speed:.2f}, f_y with v r {force_turn:.2f}); give yaw_deg, or name a column for speed"
         )
@@ -292,9 +313,12 @@ def _check_constants(evidence: Evidence, rest: Floats, options: ImportOptions) -
             )
 
 
-_SLOPE: Final = math.radians(1.2)
+_SLOPE: Final = math.radians(0.5)
 _LEAST_MOVING_S: Final = 20.0
-"""A car stands on a slope at a larger angle to the mean of a drive of at least this length, s."""
+"""A car stands on a slope at a larger angle to the mean of a drive of at least this length, s.
+
+On level roads both agree to 0.2 deg. A road's slopes are nearer to level in the mean than at one place.
+"""
 
 
 def rest_force(evidence: Evidence) -> tuple[Floats, Origin]:
@@ -321,10 +345,14 @@ def _mean_force(evidence: Evidence) -> Floats:
     mean = evidence.force.mean(axis=0)
     if weightless(evidence.force):
         return np.asarray(mean)
-    turning = turn(evidence, evidence.rate @ (-mean / np.linalg.norm(mean)))
-    # A car that leans by an angle in proportion to v r has a vertical force that varies with its square.
-    regressors = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning, turning**2])
-    return np.asarray(np.linalg.lstsq(regressors, evidence.force, rcond=None)[0][0])
+    up = mean / np.linalg.norm(mean)
+    turning = turn(evidence, -evidence.rate @ up)
+    plain = np.column_stack([np.ones(len(turning)), evidence.speed_rate, turning])
+    # A car that leans by an angle in proportion to v r has a vertical force that varies with its square. The
+    # horizontal force is the same to either side, so that its square would only explain what is noise.
+    leaning = np.column_stack([plain, turning**2])
+    flat, upright = (np.linalg.lstsq(part, evidence.force, rcond=None)[0][0] for part in (plain, leaning))
+    return np.asarray(flat + ((upright - flat) @ up) * up)
 
 
 def weightless(force: Floats) -> bool:

@@ -9,15 +9,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..cues import GRAVITY, Floats
 from ..errors import DataError
-from .mounting import Evidence, Mounting, correlation, detrended, rest_force, turn, weightless
+from .mounting import (
+    LONGEST_DELAY_S,
+    Evidence,
+    Mounting,
+    correlation,
+    detrended,
+    level,
+    rest_force,
+    turn,
+    weightless,
+)
 from .signals import ImportOptions
 from .units import RATES, UNITS
+
+Fit: TypeAlias = NDArray[np.complex128]
 
 GRAVITY_TOLERANCE: Final = 0.5
 """Gravity as a device measures it may differ by so much from 9.81 or from the one given, m/s^2."""
@@ -50,12 +63,14 @@ class Slope:
         least: Slope of the regression of the first on the second: too flat where the second is noisy.
         most: The inverse regression's: too steep where the first has other causes.
         judged: Whether both vary enough, and alike enough, to be judged.
+        opposite: Whether they vary enough, and the first falls where the second rises.
     """
 
     correlation: float
     least: float
     most: float
     judged: bool
+    opposite: bool = False
 
     @property
     def likely(self) -> float:
@@ -74,8 +89,8 @@ def slope(measured: Floats, expected: Floats, least_variation: float) -> Slope:
     if found == 0.0:
         return Slope(0.0, 0.0, 0.0, False)
     ratio = float(measured.std() / expected.std())
-    judged = found >= _SURE and max(measured.std(), expected.std()) >= least_variation
-    return Slope(found, found * ratio, ratio / found, judged)
+    varied = bool(max(measured.std(), expected.std()) >= least_variation)
+    return Slope(found, found * ratio, ratio / found, found >= _SURE and varied, found <= -_SURE and varied)
 
 
 @dataclass(frozen=True)
@@ -216,6 +231,112 @@ def _tilt_of_motion(evidence: Evidence, part: slice) -> float:
     return math.atan((abs(speed[-1] - speed[0]) / _PART_S + float(turning)) / GRAVITY)
 
 
+_AXES_S: Final = 8.0
+"""Length of the parts whose axes are compared, s."""
+_EXCITED: Final = 0.5
+"""Root mean square of dv/dt and v r together from which a part shows its axes, m/s^2."""
+_OWN_FIT, _WORSE_FIT = 0.9, 0.3
+"""Axes have changed where a part's own turn fits at least so well, and that of all before by so much less."""
+_ALIKE: Final = 0.7
+"""The motion and its mirror image fit alike down to this ratio: v r has a sixth of the power of dv/dt."""
+_DELAYS: Final = tuple(np.arange(0.0, LONGEST_DELAY_S + 0.05, 0.1).tolist())
+_MISSING: Final = 1e-3
+"""A horizontal force that varies by less is a constant, whose axis shows nothing, m/s^2."""
+_TURNS: Final = (0.05, 0.8)
+"""Root mean square of a yaw rate that shows its sense, rad/s, and the correlation that does."""
+
+
+def check_axes(evidence: Evidence) -> None:
+    """Refuse axes that change during the drive: a device that slipped, or columns that were swapped.
+
+    The horizontal force is compared with (dv/dt, v r), part by part, as complex numbers: the force of a part
+    is that motion turned by one angle, or its mirror image. The delay of the speed is the one with which
+    the parts fit best, each for itself, since that of the whole drive supposes that nothing changes.
+
+    Args:
+        evidence: With the speed as it was recorded, late.
+
+    Raises:
+        DataError: with the time from the beginning of what is imported.
+    """
+    if evidence.speed is None:
+        return
+    leveled = Mounting(*level(rest_force(evidence)[0]))
+    forward, right, _ = leveled.force_in_car(evidence.force).T
+    if min(forward.std(), right.std()) < _MISSING:
+        return
+    planar = np.asarray(forward + 1.0j * right, dtype=np.complex128)
+    rate = leveled.rate_in_car(evidence.rate)[:, 2]
+    trials = [_parts(evidence.delayed(delay), planar, rate) for delay in _DELAYS]
+    parts = max(trials, key=lambda found: sum(float(np.abs(fit).max()) for _, fit in found))
+    before = np.zeros(2, dtype=np.complex128)
+    for place, (when, fit) in enumerate(parts):
+        # A change lasts: no later part has the turn of before again.
+        later = [one for _, one in parts[place:]]
+        if (
+            np.any(before)
+            and np.abs(fit).max() >= _OWN_FIT
+            and not any(_agrees(one, before) for one in later)
+        ):
+            raise DataError(
+                f"the axes of the force change at about {when:.0f} s of the import: it follows dv/dt and v r "
+                "in another direction than before; the device moved, or columns are swapped there; leave one "
+                "part out with start_s or end_s, or set slopes='accept'"
+            )
+        before += fit
+    _check_sense(evidence, rate)
+
+
+def _parts(evidence: Evidence, planar: NDArray[np.complex128], rate: Floats) -> list[tuple[float, Fit]]:
+    """Begin, s, and fit of each part that shows its axes.
+
+    A fit is the product of the force with the motion and with its mirror image, of length 1 where it is that
+    motion. Its angle is the turn between both.
+    """
+    motion = evidence.speed_rate + 1.0j * turn(evidence, rate[: len(evidence.rate)])
+    length, found = int(_AXES_S / evidence.dt), []
+    for first in range(0, len(motion) - length + 1, length):
+        force, expected = (values[first : first + length] for values in (planar, motion))
+        force, expected = force - force.mean(), expected - expected.mean()
+        size = float(np.linalg.norm(force) * np.linalg.norm(expected))
+        if size > 0.0 and float(np.linalg.norm(expected)) >= _EXCITED * math.sqrt(length):
+            products = [np.vdot(expected, force), np.vdot(expected.conj(), force)]
+            found.append((first * evidence.dt, np.asarray(products, dtype=np.complex128) / size))
+    return found
+
+
+def _fit_of(fit: Fit, before: Fit) -> float:
+    """How well a part (2,) has the turn of the parts before it (2,)."""
+    sizes = np.abs(before)
+    # Where both fit alike, the drive so far does not show whether the axes are mirrored.
+    likely = sizes >= _ALIKE * sizes.max()
+    return float(np.real(fit * before.conj() / np.maximum(sizes, 1e-12))[likely].max())
+
+
+def _agrees(fit: Fit, before: Fit) -> bool:
+    """Whether a part (2,) fits nearly as well with the turn of the parts before it as with its own."""
+    return _fit_of(fit, before) > float(np.abs(fit).max()) - _WORSE_FIT
+
+
+def _check_sense(evidence: Evidence, rate: Floats) -> None:
+    """Refuse a yaw rate whose sense against the course changes during the drive."""
+    if evidence.course is None:
+        return
+    turning = np.gradient(evidence.course, evidence.dt)
+    length, senses = int(_AXES_S / evidence.dt), dict[float, float]()
+    for first in range(0, len(rate) - length + 1, length):
+        part = slice(first, first + length)
+        alike = correlation(rate[part], turning[part])
+        if turning[part].std() >= _TURNS[0] and abs(alike) >= _TURNS[1]:
+            senses[first * evidence.dt] = float(np.sign(alike))
+    changed = [when for when, sense in senses.items() if sense != next(iter(senses.values()))]
+    if changed:
+        raise DataError(
+            f"the sense of the rates against the course changes at about {changed[0]:.0f} s of the import; "
+            "leave one part out with start_s or end_s, or set slopes='accept'"
+        )
+
+
 def check_fastest(evidence: Evidence, units: Mapping[str, str]) -> None:
     """Refuse rates and speeds that no car has, below 0.5 Hz.
 
@@ -267,6 +388,21 @@ def check_slopes(slopes: Slopes) -> None:
         f"{shown}, expected 1: the {signal} {'are' if signal == 'rates' else 'is'} off by a factor of "
         f"{factor:.3g}{_likely_factor(signal, factor)}; declare the unit, or set slopes='accept'"
     )
+
+
+def check_senses(slopes: Slopes) -> None:
+    """Refuse signals in the car's own axes whose signs disagree; other devices have theirs estimated.
+
+    Raises:
+        DataError: names the pair that disagrees.
+    """
+    found = {"f_x on dv/dt": slopes.along, "f_y on v r": slopes.across, "heading on course": slopes.heading}
+    opposite = [name for name, one in found.items() if one is not None and one.opposite]
+    if opposite:
+        raise DataError(
+            f"{' and '.join(opposite)}: the first falls where the second rises, so a sign is wrong; reverse "
+            "its column (force_y=-force_y), or set slopes='accept'"
+        )
 
 
 def _likely_factor(signal: str, factor: float) -> str:

@@ -57,11 +57,13 @@ class Recording:
         format: For people, with the dialect.
         tables: At least one.
         changes: What was mended in the file, by choice.
+        car_axes: Whether force and rates are those of the car itself, with gravity, as telemetry has them.
     """
 
     format: str
     tables: tuple[Table, ...]
     changes: tuple[Change, ...] = field(default=())
+    car_axes: bool = False
 
     def find(self, name: str, path: str | Path) -> tuple[Table, Column]:
         """The column of that name, ``table/column`` or, where it is the only one, ``column``.

@@ -13,9 +13,10 @@ from .mdf import MDF
 from .phone import PHONE
 from .recording import Reader, Recording
 from .rosbag import ROSBAG
+from .telemetry import DATAGRAMS, NETWORK
 from .vbo import VBO
 
-FORMATS: Final[tuple[Reader, ...]] = (MDF, MCAP, ROSBAG, PHONE, VBO, DELIMITED)
+FORMATS: Final[tuple[Reader, ...]] = (MDF, MCAP, ROSBAG, DATAGRAMS, NETWORK, PHONE, VBO, DELIMITED)
 """Readers in the order in which they are tried; text tables are what is left."""
 
 _HEAD: Final = 4096
