@@ -70,6 +70,28 @@ def test_they_are_there():
     assert {BEST, "learned", "learned-ppo"} <= set(agent_names())
 
 
+@pytest.mark.parametrize(
+    ("name", "known"),
+    [
+        ("learned", "now"),
+        ("learned-controls", "controls"),
+        ("learned-road", "road"),
+        ("learned-preview", "2 s true"),
+    ],
+)
+def test_tables_name_what_it_knows(name, known):
+    assert get_agent(name).information.label == known
+
+
+def test_the_road_is_worth_more_than_controls_and_these_more_than_nothing():
+    drives = [get_maneuver(name).drive() for name in ("braking", "slalom", "roundabout")]
+    names = ("learned", "learned-controls", "learned-road")
+    scores = [
+        np.mean([measure(rollout(get_agent(name), drive)).cue_error for drive in drives]) for name in names
+    ]
+    assert scores[0] > 1.1 * scores[1] > 1.1 * 1.1 * scores[2]
+
+
 def test_without_preview_it_is_below_the_tuned_washout_on_every_maneuver(washouts):
     agent = get_agent("learned")
     for name, pair in washouts.items():
