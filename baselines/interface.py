@@ -92,14 +92,14 @@ class Live:
         simulator: With the drive's samples.
         memories: Low-passed cues of each sample, with the time constants of the low-passes, s, for each
             observation that holds some: the policy's, and that of the base policy under it.
-        shown: From the car's cues to those that are written; None where they are the same.
         known: Rows of controls and road of each sample, with what is seen of them, likewise.
+        shown: From the car's cues to those that are written; None where they are the same.
     """
 
     simulator: Simulator
     memories: tuple[tuple[Mirror, tuple[float, ...]], ...] = ()
-    shown: CueFilter | None = None
     known: tuple[tuple[Mirror, ObservationOptions], ...] = ()
+    shown: CueFilter | None = None
 
 
 class Interface(ABC):
