@@ -18,8 +18,8 @@ from motion_cueing.baselines.mpc.parameters import MpcParameters
 from motion_cueing.baselines.mpc.policy import make_mpc
 from motion_cueing.envs.maneuvers import get_maneuver
 from motion_cueing.envs.platform import get_platform
-from motion_cueing.envs.predictor import find_predictor, with_preview
 from motion_cueing.envs.storage import write_bytes
+from motion_cueing.envs.task.predictor import find_predictor, with_preview
 from motion_cueing.evaluation.metrics import measure
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.evaluation.reporting.figures import new_figure, png, styled

@@ -144,7 +144,7 @@ def with_previews(
     Raises:
         DataError: the predictor's file is missing or broken.
     """
-    from ..envs.predictor import find_predictor
+    from ..envs.task.predictor import find_predictor
 
     if preview == "predicted":
         find_predictor(predictor)
@@ -152,7 +152,7 @@ def with_previews(
 
 
 def _previewed(source: CueSource, preview: Literal["true", "held", "predicted"], predictor: str) -> CueTrace:
-    from ..envs.predictor import with_preview
+    from ..envs.task.predictor import with_preview
 
     return with_preview(source(), preview, predictor)
 

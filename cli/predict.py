@@ -33,7 +33,7 @@ class PredictCommand:
 def run(command: PredictCommand) -> int:
     """Measure."""
     from ..envs.maneuvers import held_out_drives, load_drives
-    from ..envs.predictor import find_predictor
+    from ..envs.task.predictor import find_predictor
     from ..evaluation.reporting.figures import png
     from ..evaluation.reporting.text import print_table, save_markdown, table_console
     from ..evaluation.studies.forecasts import forecast_figure, forecast_table, measure_forecasts

@@ -18,13 +18,13 @@ from ..envs.expected import ExpectedCues, Preview
 from ..envs.perception import VestibularModel, get_vestibular_model
 from ..envs.platform import Platform
 from ..envs.platform.kernels.step import CARRIAGE, LEGS, TURNTABLE
-from ..envs.predictor import DEFAULT, LivePredictor, find_predictor
 from ..envs.road import ROAD_TIMES, Ahead, RoadMap, Route
 from ..envs.simulator.kernels.observation import SCALES
 from ..envs.simulator.simulator import N_AXES, TIME_STEP, Simulator
 from ..envs.task.kernels.observation import ObservationOptions
 from ..envs.task.knowledge import Controls as KnownControls
 from ..envs.task.knowledge import KnownRows, preview_times
+from ..envs.task.predictor import DEFAULT, LivePredictor, find_predictor
 from ..evaluation.rollout import Actor
 from ..evaluation.suite import explain
 from .packets import MOTION, MOTION_SIZE, Cues, Road

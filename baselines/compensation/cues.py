@@ -64,7 +64,8 @@ def earlier(cues: CueTrace, steps: int, hold: bool = False) -> CueTrace:
         specific_force=cues.specific_force[rows],
         angular_velocity=cues.angular_velocity[rows],
         angular_acceleration=cues.angular_acceleration[rows],
-        channels={},
+        channels={name: values[rows] for name, values in cues.channels.items()},
+        road=None if cues.road is None else cues.road.resampled(cues.time, cues.time[rows]),
     )
 
 

@@ -21,8 +21,8 @@ from scipy.signal import lfilter
 from ...baselines.mpc.parameters import Forecast
 from ...envs.cues import CueTrace
 from ...envs.expected import ExpectedCues, held
-from ...envs.predictor import REST, Predictor, cues_of
 from ...envs.simulator.simulator import TIME_STEP
+from ...envs.task.predictor import REST, Predictor, cues_of
 from ..reporting.figures import new_figure, styled
 from ..reporting.text import TextTable, number, percent
 

@@ -94,12 +94,20 @@ def _refusal(policy: Any, why: str) -> ConfigurationError:
     return ConfigurationError(f"{policy.name} has no form in C: {why}")
 
 
+_SCHEDULED: Final = "its gains are chosen from outside"
+
+
 @singledispatch
 def alone(policy: Policy, to: Translator) -> Steps:
     """A policy by itself."""
     raise _refusal(
         policy, "it is neither a washout nor an agent; the washout of its file or an agent has one"
     )
+
+
+@alone.register(ScheduledWashout)
+def _(policy: Policy, to: Translator) -> Steps:
+    raise _refusal(policy, _SCHEDULED)
 
 
 @alone.register(WashoutPolicy)
@@ -187,6 +195,11 @@ def controller_of(policy: Policy, machine: Platform, to: Translator) -> Controll
     )
 
 
+@controller_of.register(ScheduledWashout)
+def _(policy: Policy, machine: Platform, to: Translator) -> Controller:
+    raise _refusal(policy, _SCHEDULED)
+
+
 @controller_of.register(WashoutPolicy)
 def _(policy: WashoutPolicy[Any], machine: Platform, to: Translator) -> Controller:
     _bind_machine(machine, to)
@@ -211,8 +224,6 @@ class _Washout:
     """Translated functions of a washout: ``act`` declares ``answer`` from a reading ``now``."""
 
     def __init__(self, policy: WashoutPolicy[Any], to: Translator) -> None:
-        if isinstance(policy, ScheduledWashout):
-            raise _refusal(policy, "its gains are chosen from outside")
         kernels = policy.family.kernels
         to.bind("WASHOUT", kernels.values(policy.parameters, policy.cab, policy.time_step))
         parameters = Code("WASHOUT", type_of(kernels.parameters), path="WASHOUT")

@@ -14,34 +14,43 @@ from motion_cueing.train.agents import Agent, agent_names, get_agent
 
 pytestmark = pytest.mark.slow
 
-WASHOUTS = ("classical", "classical-tuned")
-"""The better one by hand, and the better one on the roads that agents are trained on."""
+REFERENCE = "optimal-washout-tuned"
+"""The best washout on the drives that agents are trained on: the zero of the normalized score."""
+WASHOUTS = ("classical", REFERENCE)
+"""The washout of the paper, and the best one."""
+WORSE = {"acceleration"}
+"""Where agents without preview have a larger J than the best washout, as docs/results/agents.md says."""
 TILTS_MORE = {
-    "learned": ({"braking", "acceleration", "step-steer"}, {"braking", "acceleration", "step-steer"}),
+    "learned": (
+        {"acceleration", "braking", "hill", "steady-turn", "step-steer"},
+        {"acceleration", "braking", "steady-turn"},
+    ),
+    "learned-any-now": ({"braking", "hill", "steady-turn"}, set()),
+    "learned-controls": (
+        {"acceleration", "braking", "hill", "steady-turn", "step-steer"},
+        {"steady-turn"},
+    ),
     "learned-perceived": (
         {
-            "braking",
             "acceleration",
+            "braking",
             "double-lane-change",
+            "hill",
             "obstacle-avoidance",
-            "slalom",
+            "steady-turn",
             "step-steer",
             "stop-and-go",
         },
-        {"steady-turn", "braking", "acceleration", "step-steer", "stop-and-go"},
+        {"acceleration", "braking", "steady-turn", "stop-and-go"},
     ),
-    "learned-controls": (
-        {"acceleration", "hill", "step-steer"},
-        {"steady-turn", "braking", "step-steer"},
-    ),
-    "learned-road": ({"step-steer"}, {"step-steer"}),
     "learned-ppo-now": (
-        {"braking", "acceleration", "obstacle-avoidance", "roundabout", "stop-and-go"},
+        {"acceleration", "braking", "hill", "obstacle-avoidance", "steady-turn"},
         {"steady-turn", "step-steer"},
     ),
+    "learned-road": ({"hill", "steady-turn", "step-steer"}, set()),
 }
-"""Where an agent misses the bar, as docs/results/agents.md says: drives with a larger tilt rate than the
-tuned washout's, and with a large one for longer."""
+"""Where an agent tilts more than the best washout, as docs/results/agents.md says: drives with a larger tilt
+rate, and with a large one for longer."""
 BEST = "learned-preview"
 """Better on every single maneuver, too."""
 BEGINNING = "linear-washout"
@@ -92,11 +101,14 @@ def test_the_road_is_worth_more_than_controls_and_these_more_than_nothing():
     assert scores[0] > 1.1 * scores[1] > 1.1 * 1.1 * scores[2]
 
 
-def test_without_preview_it_is_below_the_tuned_washout_on_every_maneuver(washouts):
+def test_without_preview_it_is_below_the_best_washout_but_where_it_is_said(washouts):
     agent = get_agent("learned")
-    for name, pair in washouts.items():
-        tuned = pair[WASHOUTS.index("classical-tuned")]
-        assert measure(rollout(agent, get_maneuver(name).drive())).cue_error < tuned.cue_error, name
+    worse = {
+        name
+        for name, pair in washouts.items()
+        if measure(rollout(agent, get_maneuver(name).drive())).cue_error >= pair[1].cue_error
+    }
+    assert worse == WORSE
 
 
 @pytest.fixture(scope="module")
@@ -109,15 +121,15 @@ def test_it_is_better_than_each_washout(agent, measured, washouts, error):
     ours = {name: getattr(metrics, error) for name, metrics in measured.items()}
     theirs = {name: [getattr(metrics, error) for metrics in pair] for name, pair in washouts.items()}
     share = np.mean(list(ours.values())) / np.mean(list(theirs.values()), axis=0).min()
-    assert share < (0.5 if agent.name == BEST else 0.8)
+    assert share < (0.5 if agent.name == BEST else 0.9)
     worse = [name for name, value in ours.items() if value >= min(theirs[name])]
     assert not worse or agent.name != BEST
 
 
-def test_it_tilts_no_faster_than_the_tuned_washout(agent, measured, washouts):
-    tuned = {name: pair[WASHOUTS.index("classical-tuned")] for name, pair in washouts.items()}
+def test_it_tilts_no_faster_than_the_best_washout_but_where_it_is_said(agent, measured, washouts):
+    tuned = {name: pair[1] for name, pair in washouts.items()}
     shares = [(ours.tilt_rate_share, tuned[name].tilt_rate_share) for name, ours in measured.items()]
-    assert np.mean(shares, axis=0)[0] < 0.6 * np.mean(shares, axis=0)[1]
+    assert np.mean(shares, axis=0)[0] < np.mean(shares, axis=0)[1]
     faster = {n for n, ours in measured.items() if ours.tilt_rate_peak > tuned[n].tilt_rate_peak}
     longer = {n for n, ours in measured.items() if ours.tilt_rate_share > tuned[n].tilt_rate_share}
     assert (faster, longer) == TILTS_MORE.get(agent.name, (set(), set()))

@@ -17,11 +17,11 @@ from motion_cueing.envs.errors import ConfigurationError
 from motion_cueing.envs.maneuvers import random_drives
 from motion_cueing.envs.platform import legs_of_pose
 from motion_cueing.envs.platform.machines import ActuatorDynamics
-from motion_cueing.envs.predictor import Predictor, PredictorOptions, inputs_of, with_preview
 from motion_cueing.envs.road import ROAD_TIMES
 from motion_cueing.envs.task import ActionOptions, ObservationOptions, TaskOptions
 from motion_cueing.envs.task.kernels.observation import layout_of
 from motion_cueing.envs.task.options import load_task
+from motion_cueing.envs.task.predictor import Predictor, PredictorOptions, inputs_of, with_preview
 from motion_cueing.evaluation import rollout
 from motion_cueing.evaluation.policies import make_policy
 from motion_cueing.realtime import Cues, State, make_machine

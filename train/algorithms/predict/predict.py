@@ -23,13 +23,13 @@ from torch import nn
 from ....envs.cues import CueTrace
 from ....envs.errors import ConfigurationError
 from ....envs.maneuvers.sampling import NamedDrives, RandomDrives
-from ....envs.predictor import SCALE, Predictor, PredictorOptions, cues_of, inputs_of
 from ....envs.settings import Positive, configuration, from_dict, merge, read_yaml, save, to_dict
 from ....envs.simulator.simulator import TIME_STEP
 from ....envs.storage import write_text
 from ....envs.task.episode import library_of
 from ....envs.task.knowledge import MapErrors
 from ....envs.task.options import Count, EpisodeOptions, PositiveCount, RandomizationOptions
+from ....envs.task.predictor import SCALE, Predictor, PredictorOptions, cues_of, inputs_of
 from ...training import warm_cosine
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ import pytest
 
 from motion_cueing.cli.main import main
 from motion_cueing.envs.maneuvers import random_drives
-from motion_cueing.envs.predictor import Predictor, PredictorOptions
+from motion_cueing.envs.task.predictor import Predictor, PredictorOptions
 from motion_cueing.evaluation.studies.forecasts import measure_forecasts
 from motion_cueing.train.algorithms.predict.predict import changes_of, load_predict_config
 

@@ -11,10 +11,10 @@ from motion_cueing.envs.cues import CueScale
 from motion_cueing.envs.errors import ConfigurationError, DataError
 from motion_cueing.envs.expected import ExpectedCues, held
 from motion_cueing.envs.maneuvers import random_drives
-from motion_cueing.envs.predictor import Predictor, PredictorOptions, cues_of, inputs_of, with_preview
 from motion_cueing.envs.task.batch import Batch
 from motion_cueing.envs.task.kernels.observation import ObservationOptions
 from motion_cueing.envs.task.options import TaskOptions
+from motion_cueing.envs.task.predictor import Predictor, PredictorOptions, cues_of, inputs_of, with_preview
 
 SEEN = ObservationOptions(preview=4, preview_spacing=0.25, controls=True)
 LEADS = 0.25 * np.arange(1, 5)

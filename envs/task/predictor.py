@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from .cues import GRAVITY, CueTrace
-from .errors import ConfigurationError, DataError
-from .expected import ExpectedCues, Preview, held
-from .limits import LARGEST_AGENT, check_size
-from .road import ROAD_TIMES
-from .settings import Positive, configuration, from_dict, to_dict
-from .simulator.simulator import TIME_STEP
-from .storage import write_bytes
-from .task.kernels.observation import ObservationOptions
-from .task.knowledge import KnownRows, MapErrors, known_of
+from ..cues import GRAVITY, CueTrace
+from ..errors import ConfigurationError, DataError
+from ..expected import ExpectedCues, Preview, held
+from ..limits import LARGEST_AGENT, check_size
+from ..road import ROAD_TIMES
+from ..settings import Positive, configuration, from_dict, to_dict
+from ..simulator.simulator import TIME_STEP
+from ..storage import write_bytes
+from .kernels.observation import ObservationOptions
+from .knowledge import KnownRows, MapErrors, known_of
 
 Floats = NDArray[np.float64]
 Array = NDArray[np.float32]
