@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from motion_cueing.baselines import ClassicalWashout
+from motion_cueing.baselines import make_policy
 from motion_cueing.envs.maneuvers import get_maneuver, maneuver_names
 from motion_cueing.envs.platform import get_platform
 from motion_cueing.envs.platform.kernels import ActuatorDynamics
@@ -60,7 +60,7 @@ BEGINNING = "linear-washout"
 @pytest.fixture(scope="module")
 def washouts() -> dict[str, list[Metrics]]:
     """Metrics of the washouts by maneuver."""
-    policies = [ClassicalWashout(preset) for preset in WASHOUTS]
+    policies = [make_policy(name, get_platform("paper")) for name in WASHOUTS]
     drives = {name: get_maneuver(name).drive() for name in maneuver_names()}
     return {name: [measure(rollout(policy, cues)) for policy in policies] for name, cues in drives.items()}
 
