@@ -240,6 +240,7 @@ def _register_own() -> None:
     )
     for name, about in {
         "mpc": "predictive control that knows nothing of the drive ahead",
+        "mpc-tuned": "mpc with forecast and weights found on random drives",
         "mpc-preview": "predictive control that sees 2 s of the drive ahead",
         "mpc-full": "predictive control that knows the drive over its whole horizon, 8 s",
         "nmpc": "mpc with exact equations, solved until it converges",

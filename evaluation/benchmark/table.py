@@ -25,6 +25,7 @@ BENCHMARK_POLICIES: Final = (
     "adaptive",
     "adaptive-tuned",
     "mpc",
+    "mpc-tuned",
     "nmpc",
     "learned-ppo-now",
     "learned-any-now",
