@@ -78,7 +78,11 @@ def test_a_file_of_the_nonlinear_controller_of_before_is_read(tmp_path):
 
 
 def test_sets_go_by_name_and_differ_in_what_they_know():
-    assert mpc_presets() == ["mpc", "mpc-full", "mpc-preview", "nmpc", "nmpc-preview"]
+    assert mpc_presets() == ["mpc", "mpc-full", "mpc-preview", "mpc-tuned", "nmpc", "nmpc-preview"]
+    mpc, tuned = load_mpc("mpc"), load_mpc("mpc-tuned")
+    assert tuned.weights != mpc.weights
+    assert replace(tuned, weights=mpc.weights, forecast=mpc.forecast) == mpc
+    assert tuned.forecast.preview == 0.0
     for name in ("mpc", "mpc-preview"):
         assert load_mpc(f"n{name}") == replace(load_mpc(name), nonlinear=True)
     known = [load_mpc(name).forecast.preview for name in ("mpc", "mpc-preview")]
