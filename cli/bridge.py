@@ -29,7 +29,7 @@ _SHOWN_S: Final = 10.0
 class BridgeCommand:
     """Take telemetry of a simulator or game, and send cues to the controller that `motion-cueing serve` runs.
 
-    Knows menus, pauses, replays, teleports and repeated packets: the controller is told that the drive is
+    Knows menus, pauses, replays, teleports and repeated packets: the controller learns that the drive is
     paused. Ctrl-C ends it; then it says whether the cues followed speed and course.
     docs/guides/bridge.md has the settings of each game.
     """

@@ -103,7 +103,7 @@ class Identified:
 def identify(log: MotionLog, subsystems: Sequence[str] = SUBSYSTEMS) -> list[Identified]:
     """Lag and dead time of the subsystems of a log.
 
-    The lateness, their sum, is told by slow motion; how much of it is dead time only by motion that is fast
+    The lateness, their sum, shows in slow motion; how much of it is dead time only by motion that is fast
     for the machine, and the interval of the dead time says how well.
 
     Args:

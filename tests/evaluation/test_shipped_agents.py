@@ -51,6 +51,10 @@ TILTS_MORE = {
 }
 """Where an agent tilts more than the best washout, as docs/results/agents.md says: drives with a larger tilt
 rate, and with a large one for longer."""
+ERROR_SHARES = {"learned-preview": 0.5, "learned-any-now": 0.9, "learned-ppo-now": 0.9}
+"""Largest mean J and perceived J as a share of the best washout's; 0.8 for all others."""
+TILT_SHARES = {"learned": 0.65, "learned-perceived": 0.95, "learned-ppo-now": 0.85}
+"""Largest mean time of a large tilt rate as a share of the best washout's; 0.6 for all others."""
 BEST = "learned-preview"
 """Better on every single maneuver, too."""
 BEGINNING = "linear-washout"
@@ -121,7 +125,7 @@ def test_it_is_better_than_each_washout(agent, measured, washouts, error):
     ours = {name: getattr(metrics, error) for name, metrics in measured.items()}
     theirs = {name: [getattr(metrics, error) for metrics in pair] for name, pair in washouts.items()}
     share = np.mean(list(ours.values())) / np.mean(list(theirs.values()), axis=0).min()
-    assert share < (0.5 if agent.name == BEST else 0.9)
+    assert share < ERROR_SHARES.get(agent.name, 0.8)
     worse = [name for name, value in ours.items() if value >= min(theirs[name])]
     assert not worse or agent.name != BEST
 
@@ -129,7 +133,8 @@ def test_it_is_better_than_each_washout(agent, measured, washouts, error):
 def test_it_tilts_no_faster_than_the_best_washout_but_where_it_is_said(agent, measured, washouts):
     tuned = {name: pair[1] for name, pair in washouts.items()}
     shares = [(ours.tilt_rate_share, tuned[name].tilt_rate_share) for name, ours in measured.items()]
-    assert np.mean(shares, axis=0)[0] < np.mean(shares, axis=0)[1]
+    ours, theirs = np.mean(shares, axis=0)
+    assert ours < TILT_SHARES.get(agent.name, 0.6) * theirs
     faster = {n for n, ours in measured.items() if ours.tilt_rate_peak > tuned[n].tilt_rate_peak}
     longer = {n for n, ours in measured.items() if ours.tilt_rate_share > tuned[n].tilt_rate_share}
     assert (faster, longer) == TILTS_MORE.get(agent.name, (set(), set()))

@@ -249,7 +249,7 @@ def test_a_standing_car_is_not_frozen():
     motions = [Motion(time=100.0 + k / FPS) for k in range(600)]
     for name in PACK:
         wire = Wire(name).run(sent(motions, name), 10.0)
-        # Without a clock a copy and a standing car look alike; both are told as a pause.
+        # Without a clock a copy and a standing car look alike; both count as a pause.
         if name != "beamng":
             assert not pauses(wire), name
             np.testing.assert_allclose(wire.rows[-1, 2:], [0.0, 0.0, -G, 0.0, 0.0, 0.0], atol=1e-3)
